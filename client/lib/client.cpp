@@ -47,6 +47,7 @@ struct Client::Impl {
   FieldAssembly assembly;
   LatestUsable latest_usable;
   SessionWatch watch;
+  int mesh_nodes = 0;  // of the model that the viewer draws with; 0: not known
   std::optional<Subscription> subscription;
   std::uint64_t acknowledged = 0;  // of subscription->received
   Deadline renewed;                // when it was last renewed
@@ -130,7 +131,11 @@ struct Client::Impl {
       return updates.push(std::move(update));
     }
     if (!latest_usable.belongs(update->key()) || !watch.model_fits(update->update.model_id)) return;
+    if (auto fits = check_mesh(*update, mesh_nodes); !fits) {
+      return updates.push(protocol_error(fits.error().message));
+    }
     update->received_bytes = payload.size();
+    update->received_at = BootClock::now().time_since_epoch();
     update->received_nodes = static_cast<int>(update->update.estimate.displacement.cols());
     const FieldAssembly::Outcome outcome = assembly.complete(*update);
     if (outcome == FieldAssembly::Outcome::kLost && subscription) ask_anew();
@@ -160,7 +165,7 @@ struct Client::Impl {
   Status renew() {
     const Deadline now = std::chrono::steady_clock::now();
     const std::uint64_t id = ++last_request_id;
-    watch.asked(id, now);
+    watch.asked(id, BootClock::now());
     renewed = now;
     acknowledged = subscription->received;
     static_cast<void>(dealer->send(
@@ -178,9 +183,10 @@ struct Client::Impl {
   // What has arrived while nobody waited may be outdated by now: drops what is, once the daemon has
   // said what is newest.
   Status confirm(Deadline deadline) {
-    const Deadline asked = std::chrono::steady_clock::now();
+    const auto asked = BootClock::now();
+    const Deadline begun = std::chrono::steady_clock::now();
     while (!watch.as_of() || *watch.as_of() < asked) {
-      if (next_renewal() <= std::chrono::steady_clock::now() || renewed < asked) {
+      if (next_renewal() <= std::chrono::steady_clock::now() || renewed < begun) {
         if (auto status = renew(); !status) return status;
       }
       auto status = receive_push(std::min(deadline, next_renewal()));
@@ -209,6 +215,8 @@ struct Client::Impl {
   // The oldest queued update, on its way to the caller.
   std::optional<Result<UpdateMessage>> hand_out() {
     auto update = updates.pop();
+    // Its session may have ended while it waited.
+    while (update && *update && !latest_usable.belongs((*update)->key())) update = updates.pop();
     if (update && *update) latest_usable.take(**update);
     return update;
   }
@@ -251,6 +259,7 @@ Result<SessionInfo> Client::start_session(const SessionRequest& request) {
       .map([this](SessionInfo info) {
         impl_->latest_usable.begin(info.key());
         impl_->watch.expect_model(info.model_id);
+        impl_->mesh_nodes = info.nodes;
         return info;
       });
 }
@@ -260,6 +269,7 @@ Result<BrainModel> Client::model() {
       .and_then(wire::decode_model)
       .map([this](BrainModel model) {
         impl_->watch.expect_model(model.model_id);
+        impl_->mesh_nodes = model.mesh.num_nodes();
         return model;
       });
 }
@@ -278,7 +288,7 @@ Status Client::subscribe(std::uint32_t window, const FieldChoice& choice) {
   self.assembly.begin(choice);
   self.acknowledged = 0;
   self.renewed = std::chrono::steady_clock::now();
-  self.watch.asked(self.last_request_id + 1, self.renewed);
+  self.watch.asked(self.last_request_id + 1, BootClock::now());
   const auto state = self.request(MessageType::kSubscribeRequest, wire::encode(*self.subscription),
                                   MessageType::kSessionState)
                          .and_then(wire::decode_session_state);
@@ -332,8 +342,16 @@ const std::optional<UpdateMessage>& Client::latest_usable() const {
 
 FieldStatus Client::field_status() const {
   std::optional<std::pair<SessionKey, std::uint64_t>> shown;
-  if (const auto& field = latest_usable()) shown.emplace(field->key(), field->update.sequence);
-  return impl_->watch.judge(shown, impl_->dealer->endpoint(), std::chrono::steady_clock::now());
+  double own_age_s = std::numeric_limits<double>::quiet_NaN();
+  if (const auto& field = latest_usable()) {
+    shown.emplace(field->key(), field->update.sequence);
+    const auto held = BootClock::now().time_since_epoch() - field->received_at;
+    const AnswerTime& answer = field->update.answer_time;
+    if (answer.ms > 0.0) {
+      own_age_s = 1e-3 * answer.age_ms + std::chrono::duration<double>(held).count();
+    }
+  }
+  return impl_->watch.judge(shown, impl_->dealer->endpoint(), BootClock::now(), own_age_s);
 }
 
 const std::optional<SessionState>& Client::session_state() const { return impl_->watch.state(); }

@@ -2,10 +2,21 @@
 #include "client/lib/received_updates.hpp"
 
 #include <algorithm>
+#include <string>
 #include <utility>
 #include <vector>
 
 namespace brainshift::client {
+
+Status check_mesh(const UpdateMessage& message, int mesh_nodes) {
+  const Update& update = message.update;
+  if (mesh_nodes == 0 || message.error) return {};
+  const auto columns = static_cast<int>(update.estimate.displacement.cols());
+  const int stated = update.part ? update.part->mesh_nodes : columns;
+  if (stated == mesh_nodes || (stated == 0 && !update.usable())) return {};
+  return fail(ErrorCode::kProtocol, "update.displacement: of a mesh of " + std::to_string(stated) +
+                                        " nodes, the model has " + std::to_string(mesh_nodes));
+}
 
 void UpdateQueue::push(Result<UpdateMessage> update) {
   updates_.push_back(std::move(update));

@@ -16,6 +16,9 @@
 
 namespace brainshift::client {
 
+// kProtocol when the update's field is not one of a mesh of so many nodes; 0: it is not known.
+Status check_mesh(const UpdateMessage& message, int mesh_nodes);
+
 // Updates that arrived while a call waited for something else, in order of arrival.
 //
 // Holds `capacity` entries. When it is full, the oldest iterate gives way, because a newer one

@@ -8,7 +8,7 @@
 namespace brainshift::client {
 namespace {
 
-double seconds(std::chrono::steady_clock::duration duration) {
+double seconds(BootClock::duration duration) {
   return std::chrono::duration<double>(duration).count();
 }
 
@@ -21,9 +21,9 @@ std::string one_decimal(double value) {
 }  // namespace
 
 std::string_view to_string(Currency currency) {
-  static constexpr std::string_view kNames[] = {"none", "current", "superseded", "degraded",
-                                                "stale"};
-  return enum_name<Currency::kStale>(currency, kNames);
+  static constexpr std::string_view kNames[] = {"none",  "current", "superseded", "degraded",
+                                                "stale", "aged",    "expired"};
+  return enum_name<Currency::kExpired>(currency, kNames);
 }
 
 void SessionWatch::asked(std::uint64_t request_id, TimePoint now) {
@@ -53,7 +53,16 @@ bool SessionWatch::holds(TimePoint now) const {
 }
 
 FieldStatus SessionWatch::judge(const std::optional<std::pair<SessionKey, std::uint64_t>>& shown,
-                                const std::string& endpoint, TimePoint now) const {
+                                const std::string& endpoint, TimePoint now,
+                                double own_age_s) const {
+  FieldStatus status = currency_of(shown, endpoint, now, own_age_s);
+  status.recorded = state_ && state_->recorded;
+  return status;
+}
+
+FieldStatus SessionWatch::currency_of(
+    const std::optional<std::pair<SessionKey, std::uint64_t>>& shown, const std::string& endpoint,
+    TimePoint now, double own_age_s) const {
   constexpr double kUnknown = std::numeric_limits<double>::quiet_NaN();
   if (!state_ || !as_of_) return {Currency::kStale, "not subscribed to " + endpoint, kUnknown};
   const SessionState& state = *state_;
@@ -71,7 +80,8 @@ FieldStatus SessionWatch::judge(const std::optional<std::pair<SessionKey, std::u
   }
   const double silent_s = seconds(now - *as_of_);
   const bool newest = shown->second == state.newest_usable;
-  const double age_s = newest ? 1e-3 * state.age_ms + silent_s : kUnknown;
+  double age_s = newest ? 1e-3 * state.age_ms + silent_s : kUnknown;
+  if (shown->second > state.newest_usable) age_s = own_age_s;
   if (!holds(now)) {
     return {Currency::kStale, "no word from " + endpoint + " for " + one_decimal(silent_s) + " s",
             age_s};
@@ -79,8 +89,11 @@ FieldStatus SessionWatch::judge(const std::optional<std::pair<SessionKey, std::u
   if (shown->second < state.newest_usable) {
     return {Currency::kSuperseded, "a newer field is on its way", age_s};
   }
+  const FieldAge age = state.age_of(1e3 * age_s);
+  const std::string too_old = state.age_reason(1e3 * age_s);
+  if (age == FieldAge::kExpired) return {Currency::kExpired, too_old, age_s};
   if (state.newest_update > shown->second) return {Currency::kDegraded, state.reason, age_s};
-  return {Currency::kCurrent, {}, age_s};
+  return {age == FieldAge::kAged ? Currency::kAged : Currency::kCurrent, too_old, age_s};
 }
 
 }  // namespace brainshift::client

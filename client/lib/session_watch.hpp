@@ -6,18 +6,21 @@
 #include <chrono>
 #include <cstdint>
 #include <deque>
+#include <limits>
 #include <optional>
 #include <string>
 #include <utility>
 
 #include "client/lib/field_status.hpp"
+#include "common/core/stopwatch.hpp"
 #include "common/values/session_state.hpp"
 
 namespace brainshift::client {
 
 class SessionWatch {
  public:
-  using TimePoint = std::chrono::steady_clock::time_point;
+  // Of a clock that runs while the computer sleeps: an answer does not hold any longer then.
+  using TimePoint = BootClock::time_point;
 
   // A request for the state goes out: what its answer says holds from here.
   void asked(std::uint64_t request_id, TimePoint now);
@@ -43,10 +46,17 @@ class SessionWatch {
   bool holds(TimePoint now) const;
   // Whether a field may be shown as current. shown: session and number of the newest usable field
   // that the viewer has; empty: it has none.
+  // own_age_s: of that field, as its update says; NaN: not known. It counts as long as the daemon
+  // has not been heard since that update.
   FieldStatus judge(const std::optional<std::pair<SessionKey, std::uint64_t>>& shown,
-                    const std::string& endpoint, TimePoint now) const;
+                    const std::string& endpoint, TimePoint now,
+                    double own_age_s = std::numeric_limits<double>::quiet_NaN()) const;
 
  private:
+  // judge(), but for `recorded`.
+  FieldStatus currency_of(const std::optional<std::pair<SessionKey, std::uint64_t>>& shown,
+                          const std::string& endpoint, TimePoint now, double own_age_s) const;
+
   static constexpr std::size_t kMaxAsked = 64;
 
   std::string model_id_;

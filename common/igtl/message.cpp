@@ -8,6 +8,9 @@
 namespace brainshift::igtl {
 namespace {
 
+// A name of 19 or 20 bytes may be cut: the field has room for 20, some writers end it with a NUL.
+constexpr std::size_t kCutBytes = kMaxDeviceBytes - 1;
+
 Error of_type(std::string_view type, Error error) {
   error.message = std::string(type) + ": " + error.message;
   return error;
@@ -109,6 +112,36 @@ Result<Message> decode(std::string_view bytes) {
     return tl::unexpected<Error>(status.error());
   }
   return decode(*header, body);
+}
+
+std::string full_device(const Envelope& envelope) {
+  const std::string* whole = find(envelope.metadata, "IGTL_DEVICE_NAME");
+  const bool longer = whole != nullptr && whole->starts_with(envelope.device) &&
+                      envelope.device.size() >= kCutBytes;
+  return longer ? *whole : envelope.device;
+}
+
+bool is_named(const Envelope& envelope, std::string_view name) {
+  const std::string device = full_device(envelope);
+  if (device == name) return true;
+  return device.size() >= kCutBytes && envelope.metadata.empty() && name.starts_with(device);
+}
+
+ToolState tool_state(const Envelope& envelope, std::string_view tool) {
+  constexpr std::string_view kStatus = "Status";
+  ToolState state{std::string(tool)};
+  int others = 0, fitting = 0;
+  for (const MetadataEntry& entry : envelope.metadata) {
+    if (!entry.key.ends_with(kStatus)) continue;
+    const std::string name = entry.key.substr(0, entry.key.size() - kStatus.size());
+    if (name == tool) return {name, entry.value == "OK"};
+    ++others;
+    if (tool.size() < kCutBytes || !name.starts_with(tool)) continue;
+    ++fitting;
+    state = {name, entry.value == "OK"};
+  }
+  if (fitting == 1) return state;
+  return {std::string(tool), others == 0};
 }
 
 }  // namespace brainshift::igtl

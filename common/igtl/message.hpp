@@ -59,4 +59,19 @@ Result<Message> decode(const Header& header, std::string_view body);
 // One whole message and nothing else: header, size and CRC are checked, too.
 Result<Message> decode(std::string_view bytes);
 
+// The whole name of the message's device. Headers hold 20 bytes; PlusServer has a longer name in
+// the metadata IGTL_DEVICE_NAME of version 2.
+std::string full_device(const Envelope& envelope);
+// Whether a device was meant by its whole name. Without metadata a longer one is known by its first
+// 20 bytes alone.
+bool is_named(const Envelope& envelope, std::string_view name);
+
+// A tool of TDATA, whose whole name and validity stand in the metadata entry "<whole name>Status".
+struct ToolState {
+  std::string name;
+  bool valid = true;  // OK; also without any such metadata, which other senders do not have
+};
+// Invalid when the metadata speak of other tools only, or of two whose names begin alike.
+ToolState tool_state(const Envelope& envelope, std::string_view tool);
+
 }  // namespace brainshift::igtl

@@ -6,13 +6,17 @@
 // densely a person clicked. The default spacing of 0.2 mm is that of the paper's section 2.5.
 #pragma once
 
+#include <limits>
+
 #include "common/core/error.hpp"
 #include "common/core/types.hpp"
 
 namespace brainshift::ultrasound {
 
 struct Contour {
-  int frame = 0;               // of the recording, from 0
+  int frame = 0;  // of the recording, from 0
+  // Of the image, s since 1970 UTC, where that names it; then `frame` says nothing. NaN: none.
+  double time_s = std::numeric_limits<double>::quiet_NaN();
   bool closed = true;          // the last point is joined to the first
   Eigen::Matrix2Xd points_px;  // columns (u, v)
 };

@@ -80,6 +80,7 @@ struct TracedContour {
 struct Seed {
   int frame = 0;
   Eigen::Vector2d at_px = Eigen::Vector2d::Zero();
+  double time_s = std::numeric_limits<double>::quiet_NaN();  // as Contour's
 };
 
 // One image. kInvalidArgument: a seed outside the image, a frame that does not exist or has no

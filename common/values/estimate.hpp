@@ -199,6 +199,8 @@ struct StageTimings {  // milliseconds, monotonic clock
 struct AnswerTime {
   double ms = 0.0;        // monotonic clock; 0: not told (iterates)
   double usual_ms = 0.0;  // median over the answers of the session before it; 0: too few yet
+  // Since its data were acquired, as SessionState::age_ms, when it was encoded.
+  double age_ms = 0.0;
 
   // Later after its observation than navigation may take for granted: the brain may have moved
   // since. Says nothing about the field itself, which its verdict is for. Twice, so that no field

@@ -5,6 +5,7 @@
 // received.
 #pragma once
 
+#include <chrono>
 #include <cstddef>
 #include <cstdint>
 #include <optional>
@@ -68,6 +69,7 @@ struct UpdateMessage {
   // How it came, in a message that a client hands out: bytes of its payload, nodes in it.
   std::size_t received_bytes = 0;
   int received_nodes = 0;
+  std::chrono::nanoseconds received_at{0};  // when, on BootClock
 
   SessionKey key() const { return {boot_id, session_id, update.model_id}; }
 };

@@ -49,6 +49,29 @@ std::string_view to_string(SessionPhase phase) {
   return enum_name<SessionPhase::kClosed>(phase, kNames);
 }
 
+FieldAge SessionState::age_of(double at_ms) const {
+  if (expired_after_ms > 0 && at_ms > expired_after_ms) return FieldAge::kExpired;
+  return aged_after_ms > 0 && at_ms > aged_after_ms ? FieldAge::kAged : FieldAge::kFresh;
+}
+
+std::string SessionState::age_reason(double at_ms) const {
+  const FieldAge age = age_of(at_ms);
+  if (age == FieldAge::kFresh) return {};
+  const double limit_ms = age == FieldAge::kAged ? aged_after_ms : expired_after_ms;
+  char seconds[32];
+  std::snprintf(seconds, sizeof seconds, "%.1f", 1e-3 * at_ms);
+  return "its data are " + std::string(seconds) + " s old: " + text(1e-3 * limit_ms) + " s at most";
+}
+
+std::string SessionState::kind() const {
+  if (session.session_id == 0) return {};
+  std::string words = recorded ? "RECORDED" : "";
+  for (const std::string& word : {method, boundary}) {
+    if (!word.empty()) words += (words.empty() ? "" : ", ") + word;
+  }
+  return words;
+}
+
 bool RecordingState::holds(std::string_view source, std::uint64_t sequence) const {
   return std::any_of(sources.begin(), sources.end(), [&](const RecordedSource& recorded) {
     return recorded.source == source && sequence > recorded.lost_until &&

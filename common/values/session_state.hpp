@@ -54,20 +54,42 @@ struct RecordingState {
   bool operator==(const RecordingState&) const = default;
 };
 
+// How old the data of a field are.
+enum class FieldAge { kFresh, kAged, kExpired };
+
 // What holds at the moment when the daemon sends it. A viewer may show a field as current for
 // valid_ms after it SENT the request that this answers, as long as `session` is the field's and
 // newest_usable its number: however long the answer was on its way, it makes no field look younger.
 struct SessionState {
+  // No answer holds for longer: a daemon that says more is refused.
+  static constexpr std::uint32_t kMaxValidity_ms = 10'000;
+
   SessionKey session;
   SessionPhase phase = SessionPhase::kEmpty;
   std::uint64_t newest_update = 0;  // number of the newest final update, failures too; 0: none
   std::uint64_t newest_usable = 0;  // of the newest one with a usable field; 0: none
-  double age_ms = 0.0;              // since the observation that newest_usable answers arrived
+  // Since the observation that newest_usable answers was acquired, on the daemon's clock, sleep
+  // included; since it arrived when the session is recorded.
+  double age_ms = 0.0;
   std::uint32_t valid_ms = 0;
   std::string reason;      // why it is degraded; one sentence, else empty
   bool preparing = false;  // another session is being prepared; this one goes on until then
   std::optional<RecordingState> recording;  // empty: the daemon keeps no journal
+  // Above the first a field is aged, above the second it has expired and must not be shown; 0: no
+  // limit.
+  std::uint32_t aged_after_ms = 0;
+  std::uint32_t expired_after_ms = 0;
+  bool recorded = false;  // a recording is played: no field of it is live
+  std::string method;     // of the session; empty without one
+  std::string boundary;   // of the session; empty without one
 
+  // Of a field whose data are so old; not known (NaN): fresh.
+  FieldAge age_of(double at_ms) const;
+  // Why a field of that age is not current: "its data are 35.0 s old: 30 s at most"; empty when
+  // fresh.
+  std::string age_reason(double at_ms) const;
+  // "condensed, contact", with "RECORDED, " in front; empty without a session.
+  std::string kind() const;
   bool operator==(const SessionState&) const = default;
 };
 

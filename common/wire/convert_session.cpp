@@ -172,6 +172,11 @@ std::string encode(const SessionState& state) {
   message.set_valid_ms(state.valid_ms);
   message.set_reason(to_utf8(state.reason));
   message.set_preparing(state.preparing);
+  message.set_aged_after_ms(state.aged_after_ms);
+  message.set_expired_after_ms(state.expired_after_ms);
+  message.set_recorded(state.recorded);
+  message.set_method(to_utf8(state.method));
+  message.set_boundary(to_utf8(state.boundary));
   if (state.recording) {
     auto* recording = message.mutable_recording();
     recording->set_recording(state.recording->recording);
@@ -195,6 +200,9 @@ Result<SessionState> decode_session_state(std::string_view payload) {
       "session_state.phase", std::to_string(message.phase()) + " is unknown");
   checked.require(message.newest_usable() <= message.newest_update(), "session_state.newest_usable",
                   "is above newest_update");
+  checked.require(message.valid_ms() <= SessionState::kMaxValidity_ms, "session_state.valid_ms",
+                  std::to_string(message.valid_ms()) + ", must be at most " +
+                      std::to_string(SessionState::kMaxValidity_ms));
   SessionState state;
   state.session = session_key_from(message.session());
   state.phase = static_cast<SessionPhase>(static_cast<int>(message.phase()) - 1);
@@ -204,6 +212,11 @@ Result<SessionState> decode_session_state(std::string_view payload) {
   state.valid_ms = message.valid_ms();
   state.reason = one_line(message.reason());
   state.preparing = message.preparing();
+  state.aged_after_ms = message.aged_after_ms();
+  state.expired_after_ms = message.expired_after_ms();
+  state.recorded = message.recorded();
+  state.method = one_line(message.method());
+  state.boundary = one_line(message.boundary());
   if (message.has_recording()) {
     state.recording.emplace();
     state.recording->recording = message.recording().recording();

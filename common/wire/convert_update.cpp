@@ -51,6 +51,7 @@ void set_answer_time(const AnswerTime& time, pb::Update& out) {
   out.mutable_answer_time()->set_ms(time.ms);
   out.mutable_answer_time()->set_usual_ms(time.usual_ms);
   out.mutable_answer_time()->set_late(time.late());
+  out.mutable_answer_time()->set_age_ms(time.age_ms);
 }
 
 void set_source(const SourceSummary& source, pb::SourceSummary* out) {
@@ -99,7 +100,8 @@ StageTimings get_timings(const pb::StageTimings& message, Checked& checked) {
 
 AnswerTime get_answer_time(const pb::AnswerTime& message, Checked& checked) {
   const AnswerTime time{checked.non_negative(message.ms(), "update.answer_time.ms"),
-                        checked.non_negative(message.usual_ms(), "update.answer_time.usual_ms")};
+                        checked.non_negative(message.usual_ms(), "update.answer_time.usual_ms"),
+                        checked.non_negative(message.age_ms(), "update.answer_time.age_ms")};
   checked.require(message.late() == time.late(), "update.answer_time.late",
                   "does not follow from ms and usual_ms");
   return time;
@@ -280,7 +282,7 @@ std::string encode(const UpdateMessage& message) {
 }
 
 std::string encode_without_timings(const UpdateMessage& message) {
-  constexpr std::size_t kTimingsBytes = 96;  // seven doubles, a bool and their tags take 73 at most
+  constexpr std::size_t kTimingsBytes = 96;  // eight doubles, a bool and their tags take 82 at most
   const pb::Update out = to_message(message);
   std::string payload;
   payload.reserve(out.ByteSizeLong() + kTimingsBytes);

@@ -6,6 +6,8 @@
 #include <spdlog/spdlog.h>
 
 #include <algorithm>
+#include <chrono>
+#include <cmath>
 #include <cstdio>
 #include <cstdlib>
 #include <memory>
@@ -66,6 +68,11 @@ Result<ServiceOptions> service_options(const io::DaemonConfig& config) {
   options.blas_kernel = linalg::blas_kernel();
   options.journal_dir = config.journal_dir;
   options.journal_bytes = static_cast<std::uint64_t>(config.limits.journal_gib) << 30;
+  const auto whole_ms = [](double seconds) {
+    return std::chrono::milliseconds(std::llround(1e3 * seconds));
+  };
+  options.aged_after = whole_ms(config.age.aged_after_s);
+  options.expired_after = whole_ms(config.age.expired_after_s);
   if (config.model.empty()) return options;
   // Sessions with a fixed boundary are rare: their operators are read when one starts.
   auto file = io::read_model(config.model, {Boundary::kContact});

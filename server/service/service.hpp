@@ -78,6 +78,9 @@ struct ServiceOptions {
   std::string build = {};
   std::string machine = {};
   std::string blas_kernel = {};
+  // Of a field's data (SessionState): above them it is aged, and has expired.
+  std::chrono::milliseconds aged_after{30'000};
+  std::chrono::milliseconds expired_after{120'000};
   OpenSink open_journal = open_surgery_file;
   std::uint64_t boot_id = 0;                           // 0: a random one
   std::function<std::uint64_t()> log_lines_lost = {};  // on any thread; may be empty

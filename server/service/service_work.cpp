@@ -134,6 +134,8 @@ SessionState Service::state_now() const {
   state.session.boot_id = options_.boot_id;
   if (journal_) state.recording = recording_state(journal_->recorded());
   state.valid_ms = static_cast<std::uint32_t>(kValidity.count());
+  state.aged_after_ms = static_cast<std::uint32_t>(options_.aged_after.count());
+  state.expired_after_ms = static_cast<std::uint32_t>(options_.expired_after.count());
   return state;
 }
 
@@ -195,6 +197,7 @@ void Service::publish(UpdateMessage message, const Job& job) {
   if (update.final) {
     const double ms = std::chrono::duration<double, std::milli>(Clock::now() - job.arrived).count();
     update.answer_time = usual_time_.answer(message.session_id, ms, estimated);
+    update.answer_time.age_ms = job.age_ms(Clock::now());
   }
   wire::append_timings(update, payload);
   Bytes frame = framed(MessageType::kUpdate, 0, payload);

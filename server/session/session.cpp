@@ -21,6 +21,15 @@ double seconds_of(Session::TimePoint::duration duration) {
 
 }  // namespace
 
+Job::TimePoint Job::acquired() const {
+  if (request.recorded_clock) return arrived;
+  return TimePoint(std::chrono::nanoseconds(observation.acquired_ns));
+}
+
+double Job::age_ms(TimePoint now, std::chrono::nanoseconds asleep_now) const {
+  return std::max(0.0, 1e3 * seconds_of(now - acquired() + (asleep_now - asleep)));
+}
+
 Session::Session(std::string case_id, std::uint64_t boot_id, std::string model_id)
     : case_id_(std::move(case_id)), boot_id_(boot_id), model_id_(std::move(model_id)) {}
 
@@ -141,7 +150,7 @@ void Session::stop() {
 // ---------- observations ----------
 
 Result<Admission> Session::submit(Observation observation, TimePoint now,
-                                  const std::string& client) {
+                                  const std::string& client, std::chrono::nanoseconds asleep) {
   if (!running_) {
     return fail(ErrorCode::kModelNotReady, coming() ? "the session is still being prepared"
                                                     : "no session is running: start one first");
@@ -162,7 +171,7 @@ Result<Admission> Session::submit(Observation observation, TimePoint now,
          fmt::format("observation {} came before it was begun", observation.sequence)});
   }
   const std::string source = observation.source;
-  boxes_.insert_or_assign(source, Box{std::move(observation), ++arrivals_, now});
+  boxes_.insert_or_assign(source, Box{std::move(observation), ++arrivals_, now, asleep});
   return admission;
 }
 
@@ -183,7 +192,8 @@ std::optional<Job> Session::next_job(TimePoint now) {
              running_->request,
              ++running_->numbered,
              running_->model,
-             work_->stop.get_token()};
+             work_->stop.get_token(),
+             box.asleep};
 }
 
 std::optional<UpdateMessage> Session::finish(const Job& job, Result<Update> result) {
@@ -215,12 +225,15 @@ std::optional<UpdateMessage> Session::finish(const Job& job, Result<Update> resu
   }
   update.sequence = running_->newest_update = job.number;
   if (result && update.usable()) {
-    running_->usable_before = {running_->newest_usable, running_->usable_arrived};
+    running_->usable_before = {running_->newest_usable, running_->usable_acquired,
+                               running_->usable_asleep};
     running_->newest_usable = update.sequence;
-    running_->usable_arrived = job.arrived;
+    running_->usable_acquired = job.acquired();
+    running_->usable_asleep = job.asleep;
   } else {
     if (running_->newest_usable == job.number) {
-      std::tie(running_->newest_usable, running_->usable_arrived) = running_->usable_before;
+      std::tie(running_->newest_usable, running_->usable_acquired, running_->usable_asleep) =
+          running_->usable_before;
     }
     running_->reason = result ? update.estimate.quality.reason : message.error->message;
     decision.reason = running_->reason;
@@ -250,7 +263,7 @@ SessionPhase Session::phase() const {
                                                             : SessionPhase::kDegraded;
 }
 
-Session::State Session::state(TimePoint now) const {
+Session::State Session::state(TimePoint now, std::chrono::nanoseconds asleep) const {
   State state;
   state.shared.session = {boot_id_, 0, model_id_};
   state.shared.phase = phase();
@@ -265,10 +278,14 @@ Session::State Session::state(TimePoint now) const {
   state.max_age_s = running_->model->max_age_s;
   state.shared.session.session_id = running_->key.session_id;
   state.shared.preparing = coming();
+  state.shared.recorded = running_->request.recorded_clock;
+  state.shared.method = to_string(running_->request.method);
+  state.shared.boundary = to_string(running_->request.boundary);
   state.shared.newest_update = running_->newest_update;
   state.shared.newest_usable = running_->newest_usable;
   if (running_->newest_usable > 0) {
-    state.shared.age_ms = 1e3 * seconds_of(now - running_->usable_arrived);
+    const auto age = now - running_->usable_acquired + (asleep - running_->usable_asleep);
+    state.shared.age_ms = std::max(0.0, 1e3 * seconds_of(age));
   }
   if (state.shared.phase == SessionPhase::kDegraded) state.shared.reason = running_->reason;
   return state;

@@ -40,6 +40,7 @@
 #include <vector>
 
 #include "common/core/error.hpp"
+#include "common/core/stopwatch.hpp"
 #include "common/pipeline/pipeline.hpp"
 #include "common/values/decision.hpp"
 #include "common/values/observation.hpp"
@@ -84,6 +85,12 @@ struct Job {
   std::uint64_t number = 0;  // of the update
   SessionModel* model = nullptr;
   std::stop_token stop;
+  std::chrono::nanoseconds asleep{0};  // the computer so far, when the observation arrived
+
+  // When its data were acquired, on the daemon's clock; when they arrived, of a recording.
+  TimePoint acquired() const;
+  // Since then, the computer's sleep included.
+  double age_ms(TimePoint now, std::chrono::nanoseconds asleep_now = brainshift::asleep()) const;
 };
 
 // In the order in which they are to be acted on.
@@ -135,7 +142,9 @@ class Session {
   // kModelNotReady without a running session; the errors of check_observation and of
   // Sources::admit. A repeated observation gets its receipt once more, and nothing happens.
   // Precondition: the observation's numbers are finite (wire::decode_observation).
-  Result<Admission> submit(Observation observation, TimePoint now, const std::string& client = {});
+  // asleep: how long the computer has slept so far, which `now` leaves out.
+  Result<Admission> submit(Observation observation, TimePoint now, const std::string& client = {},
+                           std::chrono::nanoseconds asleep = brainshift::asleep());
 
   // One at a time. A session that is ready begins: whatever the job before led to is published.
   std::optional<Job> next_job(TimePoint now);
@@ -148,7 +157,8 @@ class Session {
 
   // `changed` waits for next_job() once a job is finished, so that its update is told first.
   SessionEvents take_events();
-  State state(TimePoint now) const;
+  // Ages count from acquisition on the daemon's clock, and while the computer sleeps.
+  State state(TimePoint now, std::chrono::nanoseconds asleep = brainshift::asleep()) const;
 
  private:
   struct Start {
@@ -174,14 +184,19 @@ class Session {
     std::uint64_t numbered = 0;  // updates
     std::uint64_t newest_update = 0;
     std::uint64_t newest_usable = 0;
-    TimePoint usable_arrived = {};  // the observation that newest_usable answers
-    std::pair<std::uint64_t, TimePoint> usable_before = {};  // both, of the usable one before it
-    std::string reason = {};                                 // why the newest update is not usable
+    // The observation that newest_usable answers: acquired, on the daemon's clock; arrived, when
+    // recorded.
+    TimePoint usable_acquired = {};
+    std::chrono::nanoseconds usable_asleep{0};  // so far, when it arrived
+    // All three, of the usable one before it.
+    std::tuple<std::uint64_t, TimePoint, std::chrono::nanoseconds> usable_before = {};
+    std::string reason = {};  // why the newest update is not usable
   };
   struct Box {
     Observation observation;
     std::uint64_t order = 0;
     TimePoint arrived;
+    std::chrono::nanoseconds asleep{0};
   };
   struct Work {  // the job that is handed out
     TimePoint since;

@@ -98,14 +98,16 @@ def test_plus_yields_the_points_of_import_to_single_precision(folder, inputs, re
     plus = pathlib.Path(data) / "tracked_ultrasound_plus"
     file, device, image_frame, tolerance_mm = played
     recording = Sequence.read(plus / file)
-    rows = "".join(f"{frame},{u},{v}\n" for frame, u, v in quadrangles(len(recording.frames)))
-    options = ("--device", plus / device, "--image", image_frame, "--contours",
-               write(folder / "contours.csv", "frame,u_px,v_px\n" + rows), "--registration",
-               write(folder / "registration.txt", registration(recording, plus / device, image_frame)))
+    corners = list(quadrangles(len(recording.frames)))
+    rows = "".join(f"{frame},{u},{v}\n" for frame, u, v in corners)
+    timed = "".join(f"{recording.frames[frame]['Timestamp']},{u},{v}\n" for frame, u, v in corners)
+    options = ("--device", plus / device, "--image", image_frame, "--registration",
+               write(folder / "registration.txt", registration(recording, plus / device, image_frame)), "--contours")
 
-    good(command("import", "--recording", plus / file, *options, "--case", COARSE_CASE, "--out", folder / "sweep.surgery"))
+    good(command("import", "--recording", plus / file, *options, write(folder / "contours.csv", "frame,u_px,v_px\n" + rows), "--case", COARSE_CASE, "--out", folder / "sweep.surgery"))
     from_file = points_of(folder / "sweep.surgery")
-    from_stream = streamed(folder, inputs / "head" / "model.h5", recording, options)
+    from_stream = streamed(folder, inputs / "head" / "model.h5", recording,
+                           (*options, write(folder / "timed.csv", "time_s,u_px,v_px\n" + timed), "--relative-times"))
     assert from_stream.shape == from_file.shape
     assert len(from_file) > 1000
     worst_mm = np.linalg.norm(from_stream - from_file, axis=1).max()

@@ -84,7 +84,7 @@ def test_prepare_tells_what_it_built(inputs):
 
 def test_the_simulated_surgery_of_the_paper_is_recovered(folder, daemon, paper):
     running = daemon()
-    report, _ = replay(paper, running, folder / "report.json")
+    report, _ = replay(paper, running, folder / "report.json", "--boundary", "both")
     assert len(report) == 2
     for run in report:
         assert_contract(run)
@@ -135,7 +135,7 @@ def test_a_recorded_surgery_can_be_repeated_to_measure_latency(folder, daemon, p
 
 def test_the_journal_holds_what_was_asked_and_answered(folder, daemon, paper):
     running = daemon()
-    replay(paper, running, folder / "report.json")
+    replay(paper, running, folder / "report.json", "--boundary", "both")
     assert running.end() == 0
     journals = list((folder / "journal").iterdir())
     assert len(journals) == 2, "one per session, and no leftovers of the write-ahead log"

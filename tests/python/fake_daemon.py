@@ -21,7 +21,10 @@ def state(newest_update=0, newest_usable=0, **changes):
 def update(sequence, quality=1, status="converged", **key):
     message = pb.Update(case_id="case", sequence=sequence, observation_sequence=sequence, method="condensed",
                         boundary="contact", final=True, status=status, quality=quality, **{**KEY, **key})
-    if status != "failed":
+    message.quality_flags.extend({2: [5], 3: [19]}.get(quality, []))
+    if status == "failed":
+        message.error_code = "empty_set"
+    else:
         message.displacement.xyz_mm.extend([float(sequence), 0.0, 0.0])
     return message.SerializeToString()
 

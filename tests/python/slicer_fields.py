@@ -36,8 +36,9 @@ def ras_grid(spacing=4.0, half=48.0):
 
 def label_values(**changes):
     values = dict(sequence=7, session_id=11, model_id="m1", case_id="c1", quality="good", flags="", currency="current",
-                  reason="", age_ms=40.0, direction="modeling", blank=False, has_sd=True, has_known=True, grid_error_mm=0.1,
-                  spacing_mm=4.0, fade_mm=10.0)
+                  reason="", age_ms=40.0, direction="modeling", recorded=False, method="condensed",
+                  boundary="contact", blank=False, has_sd=True, has_known=True, grid_error_mm=0.1, spacing_mm=4.0,
+                  fade_mm=10.0)
     values.update(changes)
     return values
 

@@ -7,6 +7,7 @@ AttributeError, so the stub is also the list of what the module needs: each clas
 """
 import sys
 import types
+import unittest
 
 import vtk
 
@@ -161,6 +162,9 @@ class vtkMRMLGridTransformNode(vtkMRMLTransformableNode):
         assert transform is None or transform.IsA("vtkAbstractTransform")
         self.log.append(transform)
 
+    def GetTransformToParent(self):
+        return self.log[-1]
+
 
 class vtkMRMLColorTableNode(Node):
     def __init__(self):
@@ -242,6 +246,9 @@ class Scene(Observed):
     def RemoveNode(self, node):
         self.nodes.remove(node)
 
+    def Clear(self):
+        self.close()
+
     def close(self):
         """What closing a scene does: Clear() without its singletons."""
         self.nodes = [node for node in self.nodes if node._singleton is not None]
@@ -309,8 +316,9 @@ class ScriptedLoadableModuleLogic:
         return self.parameters
 
 
-class ScriptedLoadableModuleTest:
-    pass
+class ScriptedLoadableModuleTest(unittest.TestCase):
+    def delayDisplay(self, text):
+        self.said = text
 
 
 class Widget:
@@ -337,6 +345,9 @@ class Widget:
 
     def setValue(self, value):
         self.value = value
+
+    def setTextFormat(self, format):
+        self.format = format
 
     def setStyleSheet(self, style):
         self.style = style
@@ -393,6 +404,7 @@ def install(with_openigtlink=True):
     qt, ctk = types.ModuleType("qt"), types.ModuleType("ctk")
     for name in ("QLabel", "QPushButton", "QLineEdit", "QSpinBox", "QCheckBox"):
         setattr(qt, name, type(name, (Widget,), {}))
+    qt.Qt = types.SimpleNamespace(PlainText="plain")
     qt.QFormLayout = lambda parent: Widget()
     qt.QTimer = Timer
     ctk.ctkCollapsibleButton = Widget

@@ -96,6 +96,33 @@ def test_another_session_takes_the_field_away(daemon, script, client):
     assert client.field_status().currency == Currency.NONE
 
 
+def test_updates_that_wait_end_with_their_session(daemon, script, client):
+    client.subscribe(window=16)
+    daemon.push(MessageType.UPDATE, update(1))
+    script.replies[MessageType.START_SESSION_REQUEST] = (
+        MessageType.START_SESSION_REPLY, pb.StartSessionReply(boot_id=7, session_id=2, model_id="model").SerializeToString())
+    wait_until(lambda: client._socket.poll(0))
+    client.start_session("case", takeover=True)
+    daemon.push(MessageType.UPDATE, update(1, session_id=2))
+    assert client.next_update(LONG_S).session.session_id == 2
+    assert client.latest_usable.session.session_id == 2
+
+
+def test_a_field_of_another_mesh_is_refused_by_next_update_alone(daemon, script, client):
+    script.replies[MessageType.START_SESSION_REQUEST] = (
+        MessageType.START_SESSION_REPLY,
+        pb.StartSessionReply(boot_id=7, session_id=1, model_id="model", nodes=10).SerializeToString())
+    script.replies[MessageType.STATUS_REQUEST] = (MessageType.STATUS_REPLY, pb.StatusReply(version="v").SerializeToString())
+    client.start_session("case")
+    client.subscribe(window=16)
+    daemon.push(MessageType.UPDATE, update(1))
+    wait_until(lambda: client._socket.poll(0))
+    assert client.status().version == "v"
+    with pytest.raises(brainshift.ProtocolError, match="1 nodes, the mesh has 10"):
+        client.next_update(LONG_S)
+    assert client.latest_usable is None
+
+
 def test_a_silent_daemon_makes_the_field_stale(daemon, script, client):
     script.state = state(1, 1, valid_ms=50)
     client.subscribe(window=8)

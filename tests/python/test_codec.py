@@ -128,7 +128,7 @@ def test_updates_that_contradict_themselves_are_refused(change, named):
 def test_a_part_of_nodes_that_there_are_not_is_refused():
     message = pb.Update.FromString(payload("update_changes")[0])
     message.part.mesh_nodes = 18474
-    with pytest.raises(brainshift.ProtocolError, match="nodes that there are not"):
+    with pytest.raises(brainshift.ProtocolError, match="part.node_steps: names what there is not"):
         codec.update(message.SerializeToString())
 
 

@@ -4,7 +4,7 @@ import dataclasses
 import pytest
 from conftest import golden
 
-from brainshift import Currency, Phase, SessionKey, SessionState, codec, frame
+from brainshift import AnswerTime, Currency, Phase, SessionKey, SessionState, codec, frame
 from brainshift.currency import LatestUsable, SessionWatch
 
 KEY = SessionKey(7, 1, "model")
@@ -61,6 +61,27 @@ def test_superseded_degraded_and_another_session(watch):
     assert (degraded.currency, degraded.reason) == (Currency.DEGRADED, "no point is inside")
     watch.told(state(session=SessionKey(8, 1, "model")))
     assert watch.judge(update(), "e", 10.1).currency == Currency.NONE
+
+
+def test_an_old_field_is_aged_then_expired_and_never_current(watch):
+    watch.told(state(age_ms=29_500.0, aged_after_ms=30_000, expired_after_ms=30_300))
+    assert watch.judge(update(), "e", 10.4).currency == Currency.CURRENT
+    aged = watch.judge(update(), "e", 10.6)
+    assert (aged.currency, aged.reason) == (Currency.AGED, "its data are 30.1 s old: 30 s at most")
+    assert watch.judge(update(), "e", 10.9).currency == Currency.EXPIRED
+
+
+def test_a_field_newer_than_the_state_is_as_old_as_its_update_says(watch):
+    watch.told(state(aged_after_ms=30_000))
+    answer = AnswerTime(50.0, 0.0, False, 118_000.0)
+    newer = dataclasses.replace(update(4), answer_time=answer, received_s=10.0)
+    found = watch.judge(newer, "e", 10.5)
+    assert (found.currency, found.age_s) == (Currency.AGED, pytest.approx(118.5))
+
+
+def test_a_recording_is_told_with_every_status(watch):
+    watch.told(state(recorded=True))
+    assert watch.judge(update(), "e", 10.1).recorded and watch.judge(update(), "e", 99.0).recorded
 
 
 def test_another_model_is_named(watch):

@@ -272,16 +272,16 @@ def test_agreeing_on_what_is_wrong_makes_it_no_better(change):
 def test_every_combination_is_shown_only_where_every_part_allows_it():
     shown = 0
     for quality, currency, model, session, heard in itertools.product(
-            ("good", "caution", "unusable", "none"), ("current", "superseded", "degraded", "stale", "none"), ("m1", "m2"),
+            ("good", "caution", "unusable", "none"), ("current", "superseded", "aged", "expired", "degraded", "stale", "none"), ("m1", "m2"),
             (11, 12), (0.0, 2.9, 3.1, math.inf, math.nan)):
         one = label(quality=quality, currency=currency, model_id=model)
         verdict = judge(one, dataclasses.replace(one, session_id=str(session)), heard_s=heard)
-        allowed = (quality in ("good", "caution") and currency in ("current", "superseded") and model == "m1"
+        allowed = (quality in ("good", "caution") and currency in ("current", "superseded", "aged") and model == "m1"
                    and session == 11 and heard <= 3.0)
         assert verdict.show == allowed
         assert bool(verdict.reason) == (verdict.light is not Light.GREEN)
         shown += allowed
-    assert shown == 8
+    assert shown == 12
 
 
 def test_before_the_user_has_confirmed_the_model_nothing_is_shown():
@@ -315,8 +315,13 @@ def test_a_late_answer_is_amber():
 def test_a_reservation_is_amber_with_its_reason():
     assert judge(label(quality="caution"), label(quality="caution", reason="few data")).reason == "few data"
     assert judge(label(quality="caution", flags="a+b"), label(quality="caution", flags="a+b")).light is Light.AMBER
-    assert judge(state=label(currency="superseded", reason="a newer one comes")).reason == "a newer one comes"
+    assert judge(state=label(currency="superseded", reason="a newer one comes")).reason == "superseded: a newer one comes"
     assert judge(state=label(currency="superseded")).light is Light.AMBER
+    aged = judge(state=label(currency="aged", reason="35 s old"))
+    assert (aged.light, aged.reason) == (Light.AMBER, "aged: 35 s old")
+    assert judge(state=label(currency="expired", reason="too old")).light is Light.RED
+    recorded = judge(field=label(recorded=True), state=label(recorded=True))
+    assert (recorded.light, recorded.reason) == (Light.AMBER, "RECORDED, not the patient now")
 
 
 def test_a_field_may_lag_behind_its_state_for_half_a_second():
@@ -354,7 +359,7 @@ def test_the_core_imports_nothing_of_slicer(name):
     roots = {alias.name.split(".")[0] for node in ast.walk(tree) if isinstance(node, ast.Import) for alias in node.names}
     roots |= {node.module.split(".")[0] for node in ast.walk(tree) if isinstance(node, ast.ImportFrom)}
     assert not roots & {"slicer", "qt", "ctk"}
-    assert roots <= {"__future__", "dataclasses", "enum", "json", "math", "numpy", "typing", "vtk"}
+    assert roots <= {"__future__", "dataclasses", "enum", "json", "math", "numpy", "time", "typing", "vtk"}
 
 
 def test_every_name_of_the_core_is_typed(tmp_path):

@@ -2,6 +2,7 @@
 """The Slicer module's nodes and widgets, against a stand-in for Slicer (slicer_stub.py). No Slicer runs here."""
 import importlib
 import json
+import sys
 import types
 
 import numpy as np
@@ -254,6 +255,19 @@ def test_a_deleted_node_removes_it(shown):
     assert not shown.logic.tick().show
 
 
+def test_a_renamed_volume_is_named(shown):
+    shown.node(FIELD).SetName("mine")
+    verdict = shown.logic.tick()
+    assert not verdict.show and "no volume brainshift_u" in verdict.reason and "renamed" in verdict.reason
+
+
+def test_a_deleted_connector_ends_the_connection(shown):
+    assert shown.logic.connecting
+    shown.scene.RemoveNode(shown.logic._connector)
+    assert shown.logic.tick().reason == "not connected"
+    assert not shown.logic.connecting and not shown.logic.verdict.show
+
+
 def test_a_deleted_transform_is_made_again(shown):
     shown.scene.RemoveNode(shown.transform)
     assert shown.logic.tick().show and shown.transform.log[-1] is not None
@@ -493,12 +507,19 @@ def test_the_panel_tells_errors_instead_of_raising_them(panel):
     assert "deformed already" in panel.slicer.errors[-1]
 
 
+def test_the_modules_own_test_finds_every_name(panel):
+    module = sys.modules[type(panel.widget).__module__]
+    own = module.BrainshiftTest()
+    own.runTest()
+    assert own.said == "Test passed"
+
+
 def test_text_from_the_bridge_is_no_markup(panel):
     panel.connect()
     panel.send(currency="stale", reason="<img src=x>", model_id="m1")
     panel.logic.getParameterNode().SetParameter("pinned_model_id", "m1")
     panel.widget.on_tick()
-    assert "&lt;img" in panel.widget.light.text and "<img" not in panel.widget.light.text
+    assert "<img" in panel.widget.light.text and panel.widget.light.format == "plain"
 
 
 def test_the_panel_that_is_taken_down_takes_the_field_with_it(panel):

@@ -6,12 +6,12 @@ import dataclasses
 import math
 import time
 from collections import deque
-from typing import Callable, Deque, Iterator, Optional, TypeVar
+from typing import Callable, Deque, Iterator, Optional, TypeVar, Union
 
 import zmq
 
 from . import codec, frame
-from .currency import LatestUsable, SessionWatch
+from .currency import LatestUsable, SessionWatch, boot_time
 from .errors import Error, ProtocolError, Unavailable
 from .frame import MessageType
 from .keys import Keys
@@ -74,7 +74,8 @@ class Client:
         self._watch = SessionWatch()
         self._latest = LatestUsable()
         self._subscription: Optional[_Subscription] = None
-        self._updates: Deque[Update] = deque()
+        self._updates: Deque[Union[Update, ProtocolError]] = deque()  # an error in place of an update
+        self._mesh_nodes = 0  # of the model that the viewer draws with; 0: not known
         self._sequences: dict[str, int] = {}
         self._case_id = ""
 
@@ -111,13 +112,13 @@ class Client:
         self._case_id = case_id
         self._sequences.clear()
         self._latest.begin(session.key)
-        self._watch.model_id = session.key.model_id
+        self._watch.model_id, self._mesh_nodes = session.key.model_id, session.nodes
         return session
 
     def model(self) -> Model:
         """The undeformed mesh, its surfaces and node sets: some MiB."""
         model = self._ask(MessageType.MODEL_REQUEST, b"", MessageType.MODEL_REPLY, codec.model)
-        self._watch.model_id = model.model_id
+        self._watch.model_id, self._mesh_nodes = model.model_id, len(model.nodes)
         return model
 
     def submit(self, body: Body, source: str, *, sequence: Optional[int] = None, acquired_ns: Optional[int] = None,
@@ -159,7 +160,7 @@ class Client:
         self._subscription = _Subscription(1 if before is None else before.number + 1, window, choice)
         now = time.monotonic()
         self._subscription.renewed = now
-        self._watch.asked(self._last_request + 1, now)
+        self._watch.asked(self._last_request + 1, boot_time())
         try:
             return self._ask(MessageType.SUBSCRIBE_REQUEST, self._subscription_payload(), MessageType.SESSION_STATE,
                              codec.session_state)
@@ -173,7 +174,8 @@ class Client:
 
     def next_update(self, timeout_s: float) -> Update:
         """The next update in order of arrival: an iterate, a final one of any quality, or a failure
-        (Update.failed). Only Update.usable ones may be shown. Unavailable when none arrives in time.
+        (Update.failed). Only Update.usable ones may be shown. Unavailable when none arrives in time;
+        ProtocolError for one that contradicts itself or the mesh.
 
         With a window of 1, one that had to wait here is first confirmed to be the newest.
         """
@@ -184,10 +186,13 @@ class Client:
             if self._updates:
                 self._confirm(deadline)
         while True:
-            if self._updates:
+            while self._updates:
                 update = self._updates.popleft()
-                self._latest.take(update)
-                return update
+                if isinstance(update, ProtocolError):
+                    raise update
+                if self._latest.belongs(update.session):  # else its session has ended while it waited
+                    self._latest.take(update)
+                    return update
             now = time.monotonic()
             until = deadline
             if self._subscription is not None:
@@ -213,7 +218,7 @@ class Client:
 
     def field_status(self) -> FieldStatus:
         """Whether latest_usable may be shown as current, now."""
-        return self._watch.judge(self._latest.update, self.endpoint, time.monotonic())
+        return self._watch.judge(self._latest.update, self.endpoint, boot_time())
 
     @property
     def session_state(self) -> Optional[SessionState]:
@@ -265,9 +270,14 @@ class Client:
         elif message.type == MessageType.UPDATE:
             if self._subscription is not None:
                 self._subscription.received += 1
-            update = codec.update(message.payload)
-            if self._latest.belongs(update.session) and self._watch.model_fits(update.session.model_id):
-                self._updates.append(update)
+            try:
+                update = codec.update(message.payload)
+                if not self._latest.belongs(update.session) or not self._watch.model_fits(update.session.model_id):
+                    return
+                codec.check_mesh(update, self._mesh_nodes)
+                self._updates.append(dataclasses.replace(update, received_s=boot_time()))
+            except ProtocolError as error:
+                self._updates.append(error)  # next_update() raises it, no other call
 
     def _receive_push(self, deadline: float) -> bool:
         message = self._receive(deadline)
@@ -306,14 +316,14 @@ class Client:
             self._subscription.number += 1
             self._subscription.received = self._subscription.acknowledged = 0
             return
-        self._watch.asked(self._last_request, now)
+        self._watch.asked(self._last_request, boot_time())
 
     def _confirm(self, deadline: float) -> None:
         """Drops what is outdated by now, once the daemon has said what is newest."""
         assert self._subscription is not None
-        asked = time.monotonic()
+        asked, begun = boot_time(), time.monotonic()
         while self._watch.as_of is None or self._watch.as_of < asked:
-            if self._renewal_due() <= time.monotonic() or self._subscription.renewed < asked:
+            if self._renewal_due() <= time.monotonic() or self._subscription.renewed < begun:
                 self._renew()
             if not self._receive_push(min(deadline, self._renewal_due())) and time.monotonic() >= deadline:
                 raise Unavailable(f"no answer from {self.endpoint} in time")
@@ -321,7 +331,7 @@ class Client:
         assert state is not None
         self._updates = deque(
             u for u in self._updates
-            if u.session == state.session and
+            if isinstance(u, ProtocolError) or u.session == state.session and
             u.sequence >= (state.newest_usable if u.usable else state.newest_update))
 
 

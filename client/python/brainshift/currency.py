@@ -1,17 +1,26 @@
 # SPDX-License-Identifier: Apache-2.0
 """What a viewer knows of the daemon's session, and for how long.
 
-Times are those of time.monotonic(), s, and are given by the caller. What an answer says holds from
+Times are those of boot_time(), s, and are given by the caller. What an answer says holds from
 the moment at which its request was SENT, so that no queue on the way makes a field look younger.
 """
 from __future__ import annotations
 
+import dataclasses
+import time
 from collections import OrderedDict
 from typing import Optional
 
 from .values import Currency, FieldStatus, SessionKey, SessionState, Update
 
 _MOST_ASKED = 64
+
+
+def boot_time() -> float:
+    """A monotonic clock, s, that runs while the computer sleeps, as time.monotonic() does not on Linux."""
+    if hasattr(time, "CLOCK_BOOTTIME"):
+        return time.clock_gettime(time.CLOCK_BOOTTIME)
+    return time.monotonic()
 
 
 class SessionWatch:
@@ -52,6 +61,10 @@ class SessionWatch:
 
     def judge(self, shown: Optional[Update], endpoint: str, now: float) -> FieldStatus:
         """Whether `shown`, the newest usable field that the viewer has, may be shown as current."""
+        status = self._currency(shown, endpoint, now)
+        return dataclasses.replace(status, recorded=self.state is not None and self.state.recorded)
+
+    def _currency(self, shown: Optional[Update], endpoint: str, now: float) -> FieldStatus:
         if self.state is None or self.as_of is None:
             return FieldStatus(Currency.STALE, f"not subscribed to {endpoint}", None)
         state = self.state
@@ -64,13 +77,24 @@ class SessionWatch:
                 Currency.NONE, f"no usable field of the running session yet ({state.phase.name.lower()})", None)
         silent_s = now - self.as_of
         age_s = 1e-3 * state.age_ms + silent_s if shown.sequence == state.newest_usable else None
+        if shown.sequence > state.newest_usable and shown.answer_time.ms > 0.0:  # the daemon's word is older
+            age_s = 1e-3 * shown.answer_time.age_ms + now - shown.received_s
         if silent_s >= 1e-3 * state.valid_ms:
             return FieldStatus(Currency.STALE, f"no word from {endpoint} for {silent_s:.1f} s", age_s)
         if shown.sequence < state.newest_usable:
             return FieldStatus(Currency.SUPERSEDED, "a newer field is on its way", age_s)
+        age_ms = 0.0 if age_s is None else 1e3 * age_s
+        if 0 < state.expired_after_ms < age_ms:
+            return FieldStatus(Currency.EXPIRED, _too_old(age_ms, state.expired_after_ms), age_s)
         if state.newest_update > shown.sequence:
             return FieldStatus(Currency.DEGRADED, state.reason, age_s)
+        if 0 < state.aged_after_ms < age_ms:
+            return FieldStatus(Currency.AGED, _too_old(age_ms, state.aged_after_ms), age_s)
         return FieldStatus(Currency.CURRENT, "", age_s)
+
+
+def _too_old(age_ms: float, limit_ms: int) -> str:
+    return f"its data are {1e-3 * age_ms:.1f} s old: {1e-3 * limit_ms:g} s at most"
 
 
 class LatestUsable:

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import enum
 from dataclasses import dataclass, field
-from typing import Any, Optional, Union
+from typing import Any, ClassVar, Optional, Union
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -38,14 +38,21 @@ class Phase(enum.IntEnum):
 
 @dataclass(frozen=True)
 class SessionState:
+    MOST_VALID_MS: ClassVar[int] = 10_000  # a daemon that says more is refused
+
     session: SessionKey
     phase: Phase
     newest_update: int  # sequence; 0: none
     newest_usable: int  # sequence; 0: none
-    age_ms: float  # since the observation that newest_usable answers arrived
+    age_ms: float  # since the observation that newest_usable answers was acquired, on the daemon's clock
     valid_ms: int  # how long the answer holds, from the moment at which it was asked for
     reason: str  # why the session is degraded, else empty
     preparing: bool  # another session is being prepared
+    aged_after_ms: int = 0  # above it a field is aged; 0: no limit
+    expired_after_ms: int = 0  # above it a field has expired: not to be shown; 0: no limit
+    recorded: bool = False  # a recording is played: no field of it is live
+    method: str = ""  # of the session
+    boundary: str = ""  # of the session
 
 
 @dataclass(frozen=True)
@@ -251,6 +258,7 @@ class AnswerTime:
     ms: float
     usual_ms: float  # median over the earlier answers of the session; 0: too few yet
     late: bool  # ms > 2 usual_ms: the brain may have moved since
+    age_ms: float = 0.0  # since its data were acquired, by the daemon's clock, when it was encoded
 
 
 @dataclass(frozen=True)
@@ -316,6 +324,7 @@ class Update:
     misfit_ratio: Optional[float]  # 1: data as far off as their errors say
     data_outside_region: int
     region_known: Optional[float]  # mean of known over the region of surgery
+    received_s: float = 0.0  # when this client received it, by currency.boot_time()
 
     @property
     def failed(self) -> bool:
@@ -346,10 +355,13 @@ class Currency(enum.Enum):
     SUPERSEDED = "superseded"  # a newer usable one is on its way
     DEGRADED = "degraded"  # the newest usable one, but a newer observation gave none
     STALE = "stale"  # nothing is known of the daemon any more: it may be older than it looks
+    AGED = "aged"  # the newest usable one, but older than the daemon's first limit: show it with that word
+    EXPIRED = "expired"  # older than the second limit: not to be shown
 
 
 @dataclass(frozen=True)
 class FieldStatus:
     currency: Currency
     reason: str  # one sentence to show; empty when current
-    age_s: Optional[float]  # since the observation that it answers reached the daemon; None: not known
+    age_s: Optional[float]  # since its data were acquired; None: not known
+    recorded: bool = False  # a recording is played: display the word RECORDED with its field

@@ -8,8 +8,6 @@ What may be shown, and the transform, are made in BrainshiftLib, which knows not
 """
 from __future__ import annotations
 
-import html
-import time
 
 import ctk
 import qt
@@ -17,7 +15,7 @@ import slicer
 import vtk
 from BrainshiftLib.colours import FULL_SCALE_MM
 from BrainshiftLib.grid import FieldError, check_field, field_from_image, grid_transform
-from BrainshiftLib.label import LabelError, Light, Verdict, may_be_shown, parse_metadata, parse_state
+from BrainshiftLib.label import LabelError, Light, Verdict, boot_time, may_be_shown, parse_metadata, parse_state
 from BrainshiftLib.scene import FIELD, KNOWN, SD, STATE, TRANSFORM, SceneNodes, bridge_node
 from slicer.ScriptedLoadableModule import (ScriptedLoadableModule, ScriptedLoadableModuleLogic,
                                            ScriptedLoadableModuleTest, ScriptedLoadableModuleWidget)
@@ -48,7 +46,7 @@ class Brainshift(ScriptedLoadableModule):
 class BrainshiftLogic(ScriptedLoadableModuleLogic, VTKObservationMixin):
     """Follows the bridge's nodes. Every tick() decides anew what may be shown."""
 
-    def __init__(self, clock=time.monotonic):
+    def __init__(self, clock=boot_time):
         ScriptedLoadableModuleLogic.__init__(self)
         VTKObservationMixin.__init__(self)
         self.verdict = Verdict(Light.RED, "not connected")
@@ -178,6 +176,10 @@ class BrainshiftLogic(ScriptedLoadableModuleLogic, VTKObservationMixin):
 
     def tick(self):
         """Looks at the newest nodes, and shows or takes away. Never raises for what the bridge sends."""
+        if self._connector is not None and slicer.mrmlScene.GetNodeByID(self._connector.GetID()) is None:
+            self._connector.Stop()  # its node was deleted: nothing comes any more
+            self._connector = None
+            self._forget()
         self._watch()
         self.verdict, label = self._judge()
         if self.verdict.show:
@@ -191,6 +193,8 @@ class BrainshiftLogic(ScriptedLoadableModuleLogic, VTKObservationMixin):
         """Verdict, and the label of the field."""
         if not self.connecting:
             return Verdict(Light.RED, "not connected"), None
+        if bridge_node(FIELD) is None and self.connected:
+            return Verdict(Light.RED, f"there is no volume {FIELD}: none has come, or it was renamed or deleted"), None
         if not self.connected:
             self._heard_at = None
             return Verdict(Light.RED, "no connection to the bridge"), None
@@ -267,6 +271,11 @@ class BrainshiftWidget(ScriptedLoadableModuleWidget, VTKObservationMixin):
         button.connect("clicked()", clicked)
         return button
 
+    @staticmethod
+    def _plain(label):
+        """What others sent is shown as it is: no markup, and no escapes of it."""
+        label.setTextFormat(qt.Qt.PlainText)
+
     def _setup_connection(self):
         form = self._form("Bridge")
         self.host = qt.QLineEdit(DEFAULT_HOST)
@@ -277,6 +286,7 @@ class BrainshiftWidget(ScriptedLoadableModuleWidget, VTKObservationMixin):
         self.patient = qt.QLabel("")
         self.pin_button = self._button("This is the model of my patient", self.on_pin)
         self.unpin_button = self._button("Release the model", self.on_unpin)
+        self._plain(self.patient)
         for label, widget in (("Host", self.host), ("Port", self.port), ("", self.connect_button), ("Model", self.patient),
                               ("", self.pin_button), ("", self.unpin_button)):
             form.addRow(label, widget)
@@ -286,6 +296,8 @@ class BrainshiftWidget(ScriptedLoadableModuleWidget, VTKObservationMixin):
         self.light = qt.QLabel("")
         self.light.wordWrap = True
         self.details = qt.QLabel("")
+        self._plain(self.light)
+        self._plain(self.details)
         self.followers = slicer.qMRMLCheckableNodeComboBox()
         self.followers.nodeTypes = ["vtkMRMLScalarVolumeNode", "vtkMRMLLabelMapVolumeNode", "vtkMRMLModelNode",
                                     "vtkMRMLSegmentationNode", "vtkMRMLMarkupsNode"]
@@ -342,11 +354,11 @@ class BrainshiftWidget(ScriptedLoadableModuleWidget, VTKObservationMixin):
         verdict, state = self.logic.tick(), self.logic.state
         self.connect_button.text = "Disconnect" if self.logic.connecting else "Connect"
         model = self.logic.pinned_model if state is None else f"{state.case_id}, {state.model_id}"
-        self.patient.text = html.escape(model)
+        self.patient.text = model
         words = "Shown" if verdict.show else "NOT SHOWN"
-        self.light.text = html.escape(f"{words}: {verdict.reason}" if verdict.reason else words)
+        self.light.text = f"{words}: {verdict.reason}" if verdict.reason else words
         self.light.setStyleSheet(f"color: white; padding: 6px; background: {self.BACKGROUND[verdict.light]}")
-        self.details.text = html.escape(describe(state, self.logic.nodes.largest_mm))
+        self.details.text = describe(state, self.logic.nodes.largest_mm)
 
 
 def describe(state, largest_mm):
@@ -354,6 +366,7 @@ def describe(state, largest_mm):
     if state is None:
         return ""
     lines = [f"quality {state.quality}" + (f" ({state.flags})" if state.flags else ""),
+             ("RECORDED, " if state.recorded else "") + f"{state.method}, {state.boundary}",
              "age of its data not known" if state.age_ms is None else f"age of its data {state.age_ms / 1000.0:.1f} s"]
     if largest_mm is not None:
         lines.append(f"largest motion {largest_mm:.1f} mm")

@@ -85,8 +85,8 @@ Result<std::unique_ptr<Bridge>> Bridge::open(const BridgeOptions& options, Tell 
   hub.from_peers = inbox->from_peers();
   hub.from_upstream = inbox->from_upstream();
   const auto note = [&self](const std::string& sentence) { self.note(sentence); };
-  self.worker =
-      std::make_unique<InboundWorker>(std::move(*inbox), options.endpoint, options.keys, note);
+  self.worker = std::make_unique<InboundWorker>(std::move(*inbox), options.endpoint, options.keys,
+                                                note, options.case_id);
   auto opened = Hub::open(
       hub, note, [&self](igtl::Message&& message) { self.worker->post(std::move(message)); });
   if (!opened) return tl::unexpected(opened.error());

@@ -29,6 +29,7 @@ struct BridgeOptions {
   StreamOptions stream;
   std::optional<Address> from;
   InboxOptions inbox;
+  std::string case_id = {};  // that what comes in belongs to; empty: the first that is followed
   bool json = false;
 };
 

@@ -33,6 +33,7 @@ class Broadcast {
   Broadcast(PicturePtr picture, Part part, std::uint32_t message_id);
 
   const Picture& picture() const { return *picture_; }
+  const PicturePtr& picture_ptr() const { return picture_; }
   bool whole() const { return part_ == Part::kWhole; }
   std::size_t size() const { return devices_.size(); }
   // One message, 0 <= i < size(). Empty when it cannot be encoded: then error() says why.

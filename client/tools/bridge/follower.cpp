@@ -31,12 +31,14 @@ void rest_for(const std::stop_token& stop, milliseconds time) {
 Change change_of(const FieldStatus& status, std::uint64_t newest_usable, std::uint64_t shown,
                  Currency shown_currency) {
   switch (status.currency) {
-    case Currency::kCurrent: return newest_usable == shown ? Change::kNone : Change::kShow;
+    case Currency::kCurrent:
+    case Currency::kAged: return newest_usable == shown ? Change::kNone : Change::kShow;
     // The newer one comes within milliseconds, or the field goes stale.
     case Currency::kSuperseded: return Change::kNone;
     case Currency::kNone:
     case Currency::kDegraded:
-    case Currency::kStale: break;
+    case Currency::kStale:
+    case Currency::kExpired: break;
   }
   const bool stands = shown == 0 && shown_currency == status.currency;
   return stands ? Change::kNone : Change::kBlank;
@@ -54,7 +56,11 @@ Status Follower::run(const std::stop_token& stop) {
                             status.error().code == ErrorCode::kModelNotReady;
       if (!began_ && !may_pass) return status;
       FieldStatus none{Currency::kStale, status.error().message, std::nan("")};
-      if (!shown_ || !shown_->state.blank || shown_->state.reason != none.reason) blank(none);
+      if (!shown_ || !shown_->state.blank || shown_->state.reason != none.reason) {
+        blank(none);
+      } else {
+        sign_of_life(none);
+      }
       if (std::exchange(told_, none.reason) != none.reason) calls_.tell(none.reason);
     }
     rest_for(stop, kRetry);
@@ -165,7 +171,10 @@ void Follower::show_newest() {
     if (const auto newer = client_->next_update(kForItsAge)) note(*newer);
   }
   const FieldStatus status = client_->field_status();
-  if (status.currency != Currency::kCurrent && status.currency != Currency::kSuperseded) return;
+  const bool aged = status.currency == Currency::kAged;
+  if (!aged && status.currency != Currency::kCurrent && status.currency != Currency::kSuperseded) {
+    return;
+  }
   const Stopwatch watch;
   auto picture = stream_->picture(*client_->latest_usable());
   if (!picture) {
@@ -173,12 +182,24 @@ void Follower::show_newest() {
     return;
   }
   ShownState& state = (*picture)->state;
-  state.currency = Currency::kCurrent;
-  state.age_ms = 1e3 * client_->field_status().age_s;
+  state.currency = aged ? Currency::kAged : Currency::kCurrent;
+  if (aged) state.reason = status.reason;
+  state.age_ms = 1e3 * status.age_s;
+  describe_session(state);
   shown_ = *picture;
   said_ = Clock::now();
+  said_currency_ = state.currency;
   calls_.show(shown_);
   calls_.shown(*shown_, *stream_, watch.milliseconds());
+}
+
+void Follower::describe_session(ShownState& state) const {
+  if (!client_ || !client_->session_state()) return;
+  const SessionState& said = *client_->session_state();
+  state.session_id = said.session.session_id;
+  state.recorded = said.recorded;
+  state.method = said.method;
+  state.boundary = said.boundary;
 }
 
 ShownState Follower::state_without_field(const FieldStatus& status) const {
@@ -187,9 +208,7 @@ ShownState Follower::state_without_field(const FieldStatus& status) const {
   state.case_id = case_id_;
   state.currency = status.currency;
   state.reason = status.reason;
-  if (client_ && client_->session_state()) {
-    state.session_id = client_->session_state()->session.session_id;
-  }
+  describe_session(state);
   if (stream_) {
     state.spacing_mm = stream_->grid().spacing_mm;
     state.fade_mm = stream_->fade_mm();
@@ -207,19 +226,25 @@ void Follower::blank(const FieldStatus& status) {
   const bool stood = shown_ && !shown_->state.blank;
   shown_ = blank_picture(stream_ ? stream_->rest() : nullptr, state_without_field(status));
   said_ = Clock::now();
+  said_currency_ = status.currency;
   calls_.show(shown_);
   if (stood) calls_.tell("blank: " + shown_->state.reason);
 }
 
 void Follower::sign_of_life(const FieldStatus& status) {
   if (!shown_ || status.currency == Currency::kSuperseded) return;
-  if (Clock::now() - said_ < kSignOfLife) return;
+  if (Clock::now() - said_ < kSignOfLife && status.currency == said_currency_) return;
   said_ = Clock::now();
+  said_currency_ = status.currency;
   auto state = std::make_shared<Picture>();
   if (shown_->state.blank) {
     state->state = state_without_field(status);  // a session may have begun
   } else {
     state->state = shown_->state;
+    if (status.currency == Currency::kAged || shown_->state.currency == Currency::kAged) {
+      state->state.currency = status.currency;
+      state->state.reason = status.reason;
+    }
     state->state.age_ms = 1e3 * status.age_s;
   }
   state->time = time_now();

@@ -5,9 +5,10 @@
 // lease (client/lib/field_status.hpp). A blank picture with the reason takes its place
 //   - when the newest observation gave no usable field (degraded),
 //   - when nothing is heard of the daemon any more (stale), by this computer's own clock,
+//   - when its data are older than the daemon's second limit (expired),
 //   - when the session has ended, another one runs, or the daemon serves another model.
-// The state goes out once a second besides, as a sign of life. It connects again by itself, and
-// makes grid and surfaces anew for another model.
+// An aged field stays, with that word. The state goes out once a second besides, as a sign of
+// life. It connects again by itself, and makes grid and surfaces anew for another model.
 //
 // Runs in a thread of its own; the callbacks are called there.
 #pragma once
@@ -80,6 +81,7 @@ class Follower {
   void blank(const FieldStatus& status);
   void sign_of_life(const FieldStatus& status);
   void tell_session();
+  void describe_session(ShownState& state) const;
   ShownState state_without_field(const FieldStatus& status) const;
 
   FollowerOptions options_;
@@ -95,6 +97,7 @@ class Follower {
   std::string newest_reason_;
   PicturePtr shown_;
   Clock::time_point said_{};
+  Currency said_currency_ = Currency::kNone;
   std::optional<Clock::time_point> superseded_since_;
   Followed followed_;
 };

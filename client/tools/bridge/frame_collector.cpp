@@ -65,17 +65,19 @@ void FrameCollector::take(const igtl::Message& message, TimePoint arrived) {
   const igtl::Envelope& envelope = message.envelope;
   if (const auto* image = std::get_if<igtl::Image>(&message.content)) {
     if (!options_.image_device.empty() && envelope.device != options_.image_device) return;
-    take_image(*image, *moment_at(envelope.timestamp, arrived), arrived);
+    Moment& moment = *moment_at(envelope.timestamp, arrived);
+    if (!moment.image) moment.untimed = envelope.timestamp == 0;
+    take_image(*image, moment, arrived);
   } else if (const auto* transform = std::get_if<igtl::Transform>(&message.content)) {
-    take_transform(envelope.device, transform->matrix,
-                   igtl::find(envelope.metadata, "TransformStatus"),
-                   *moment_at(envelope.timestamp, arrived));
+    const std::string* status = igtl::find(envelope.metadata, "TransformStatus");
+    take_transform(igtl::full_device(envelope), transform->matrix,
+                   status == nullptr || *status == "OK", *moment_at(envelope.timestamp, arrived));
   } else if (const auto* tools = std::get_if<igtl::TrackingData>(&message.content)) {
     for (const igtl::TrackedTool& tool : tools->tools) {
-      const bool names_two_frames = tracking::parse_transform_name(tool.name).has_value();
-      take_transform(names_two_frames ? tool.name : tool.name + kTracker, tool.matrix,
-                     igtl::find(envelope.metadata, tool.name + "Status"),
-                     *moment_at(envelope.timestamp, arrived));
+      const igtl::ToolState state = igtl::tool_state(envelope, tool.name);
+      const bool names_two_frames = tracking::parse_transform_name(state.name).has_value();
+      take_transform(names_two_frames ? state.name : state.name + kTracker, tool.matrix,
+                     state.valid, *moment_at(envelope.timestamp, arrived));
     }
   }
 }
@@ -99,14 +101,14 @@ void FrameCollector::take_image(const igtl::Image& image, Moment& moment, TimePo
 }
 
 void FrameCollector::take_transform(const std::string& name, const igtl::Matrix34f& values,
-                                    const std::string* status, Moment& moment) {
+                                    bool valid, Moment& moment) {
   const auto frames = tracking::parse_transform_name(name);
   if (!frames) return leave_out("transform " + name + ", which names no two frames");
   const std::string key = frames->name();
   pairs_.emplace(key, *frames);
   tracking::Link& link = moment.links[key];
   link.status = tracking::LinkStatus::kInvalid;
-  if (status != nullptr && *status != "OK") return;
+  if (!valid) return;
   const Eigen::Matrix4d matrix = igtl::to_matrix(values);
   const bool scales =
       tracking::is_image_frame(frames->from) || tracking::is_image_frame(frames->to);
@@ -146,6 +148,8 @@ CollectedSweep FrameCollector::finish() {
     }
     if (moment.image) {
       sweep.moment_of_image.push_back(at);
+      sweep.image_ns.push_back(ns);
+      sweep.untimed = sweep.untimed || moment.untimed;
       sweep.images.time_s.push_back(time_s);
       sweep.images.image_ok.push_back(1);
       sweep.images.pixels += moment.pixels;

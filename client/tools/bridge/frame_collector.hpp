@@ -8,7 +8,8 @@
 //
 // A transform's name is the device name of TRANSFORM, the tool's name in TDATA; a tool's name that
 // is no pair of frames ("Probe") means ProbeToTracker. Its validity stands in the metadata
-// TransformStatus, or NAMEStatus for TDATA: anything but OK is invalid. Version 1 has no metadata;
+// TransformStatus, or NAMEStatus for TDATA: anything but OK is invalid. Names above 20 bytes stand
+// in the metadata as well (igtl::full_device, igtl::tool_state). Version 1 has no metadata;
 // PlusServer then sends valid transforms alone (SendValidTransformsOnly), so they count as valid.
 // Matrices are checked as those of files are. Source: vtkPlusIgtlMessageCommon.cxx of
 // PlusToolkit/PlusLib.
@@ -41,6 +42,9 @@ struct CollectedSweep {
   tracking::Recording moments;
   // Of image i, counted from the sweep's first: its frame of `moments`.
   std::vector<int> moment_of_image;
+  // Their own times, ns since 1970 UTC; of arrival where they have none (then `untimed`).
+  std::vector<std::int64_t> image_ns;
+  bool untimed = false;  // an image came without a time
   // The images alone, with their pixels when they were kept.
   tracking::Recording images;
   std::chrono::steady_clock::time_point last_image;  // when it came
@@ -64,6 +68,7 @@ class FrameCollector {
  private:
   struct Moment {
     bool image = false;
+    bool untimed = false;
     std::string pixels;
     std::map<std::string, tracking::Link> links;
   };
@@ -74,8 +79,8 @@ class FrameCollector {
 
   Moment* moment_at(igtl::Timestamp time, TimePoint arrived);
   void take_image(const igtl::Image& image, Moment& moment, TimePoint arrived);
-  void take_transform(const std::string& name, const igtl::Matrix34f& values,
-                      const std::string* status, Moment& moment);
+  void take_transform(const std::string& name, const igtl::Matrix34f& values, bool valid,
+                      Moment& moment);
   void leave_out(const std::string& reason) { ++left_out_[reason]; }
 
   CollectorOptions options_;

@@ -59,10 +59,11 @@ void Hub::post(PicturePtr picture, Broadcast::Part part) {
   {
     const std::lock_guard lock(mutex_);
     if (part == Broadcast::Part::kWhole) {
-      pending_ = {std::move(picture), nullptr};
+      pending_ = {std::move(picture), nullptr, {}};
     } else {
       pending_.state = std::move(picture);
     }
+    pending_.posted = BootClock::now();
   }
   wake();
 }
@@ -75,6 +76,10 @@ void Hub::take_posts() {
     const std::lock_guard lock(mutex_);
     taken = std::exchange(pending_, {});
   }
+  if (!taken.whole && !taken.state) return;
+  heard_ = taken.posted;
+  if (!taken.whole && hidden_) taken.whole = hidden_->picture_ptr();
+  hidden_ = nullptr;
   if (taken.whole) offer(std::move(taken.whole), Broadcast::Part::kWhole);
   if (taken.state) offer(std::move(taken.state), Broadcast::Part::kState);
 }
@@ -83,6 +88,7 @@ void Hub::offer(PicturePtr picture, Broadcast::Part part) {
   newest_state_ = picture;
   auto broadcast = std::make_shared<Broadcast>(std::move(picture), part, ++message_id_);
   if (broadcast->whole()) newest_picture_ = broadcast;
+  newest_state_broadcast_ = broadcast->whole() ? nullptr : broadcast;
   for (const auto& peer : peers_) peer->offer(broadcast);
 }
 
@@ -96,6 +102,7 @@ void Hub::accept_peers() {
     auto peer = std::make_unique<Peer>(std::move(*socket), options_.from_peers);
     tell_("client " + peer->name() + ": connected");
     if (newest_picture_) peer->offer(newest_picture_);
+    if (newest_state_broadcast_) peer->offer(newest_state_broadcast_);  // its age is the newest
     peers_.push_back(std::move(peer));
   }
 }
@@ -107,9 +114,7 @@ Status Hub::answer(Peer& peer, igtl::Message&& message) {
   envelope.timestamp = time_now();
   envelope.message_id = message.envelope.message_id;
   if (std::holds_alternative<igtl::StatusRequest>(message.content)) {
-    ShownState state;
-    state.reason = "the bridge has just begun";
-    if (newest_state_) state = newest_state_->state;
+    const ShownState state = state_now();
     if (envelope.version >= 2) envelope.metadata = to_metadata(state);
     return peer.reply(envelope, to_status(state));
   }
@@ -117,8 +122,46 @@ Status Hub::answer(Peer& peer, igtl::Message&& message) {
     return peer.reply(envelope, igtl::Capability{{"STATUS", "STRING", "IMAGE", "POLYDATA",
                                                   "GET_STATUS", "GET_CAPABIL"}});
   }
-  sink_(std::move(message));
+  hand_on(std::move(message));
   return {};
+}
+
+ShownState Hub::state_now() const {
+  ShownState state;
+  state.reason = "the bridge has just begun";
+  if (newest_state_) state = newest_state_->state;
+  const auto silent = BootClock::now() - heard_;
+  const double silent_ms = std::chrono::duration<double, std::milli>(silent).count();
+  state.age_ms += silent_ms;
+  if (silent <= options_.silence) return state;
+  state.currency = Currency::kStale;
+  state.reason = "the bridge has not looked at the daemon for " +
+                 std::to_string(static_cast<int>(silent_ms / 1e3)) + " s";
+  return state;
+}
+
+void Hub::blank_in_silence() {
+  if (BootClock::now() - heard_ <= options_.silence) return;
+  if (hidden_ || !newest_picture_ || newest_picture_->picture().state.blank) return;
+  const BroadcastPtr stood = newest_picture_;
+  offer(blank_picture(stood->picture().rest, state_now()), Broadcast::Part::kWhole);
+  hidden_ = stood;
+  tell_("blank: " + newest_state_->state.reason);
+}
+
+void Hub::watch_standstill(bool anything_came) {
+  const auto now = BootClock::now();
+  if (now - std::exchange(turned_, now) > std::chrono::milliseconds(kLook_ms) + kStandstill) {
+    stood_still_ = true;
+    tell_("the bridge stood still: what came meanwhile without a time is not used");
+  } else if (!anything_came) {
+    stood_still_ = false;
+  }
+}
+
+void Hub::hand_on(igtl::Message&& message) {
+  if (stood_still_ && message.envelope.timestamp == 0) return;
+  sink_(std::move(message));
 }
 
 void Hub::serve_peers(const std::vector<short>& events) {
@@ -186,7 +229,11 @@ Status Hub::run(int stop_descriptor) {
     if (::poll(polled.data(), polled.size(), kLook_ms) < 0 && errno != EINTR) {
       return fail(ErrorCode::kInternal, std::string("poll: ") + std::strerror(errno));
     }
+    watch_standstill(std::any_of(polled.begin() + 2, polled.end(), [](const pollfd& item) {
+      return (item.revents & kReadable) != 0;
+    }));
     if (polled[1].revents != 0) take_posts();
+    if (!ends) blank_in_silence();
     events.clear();
     for (std::size_t i = 4; i < polled.size(); ++i) events.push_back(polled[i].revents);
     if (polled[0].revents != 0) {
@@ -198,7 +245,8 @@ Status Hub::run(int stop_descriptor) {
     if (upstream_ && polled[3].revents != 0) {
       const bool readable = (polled[3].revents & kReadable) != 0;
       const bool writable = (polled[3].revents & kWritable) != 0;
-      if (const auto news = upstream_->ready(readable, writable, Clock::now(), sink_)) tell_(*news);
+      const auto hand = [this](igtl::Message&& message) { hand_on(std::move(message)); };
+      if (const auto news = upstream_->ready(readable, writable, Clock::now(), hand)) tell_(*news);
     }
   }
 }

@@ -5,12 +5,18 @@
 // post() hands over pictures from any thread. run() serves until it is told to stop; then it sends
 // every client a blank picture first.
 //
-// Requests: GET_STATUS is answered with the newest STATUS, GET_CAPABIL with the types that are
-// sent. Other messages go to the sink, in the hub's thread; types that nobody wants are read and
-// dropped.
+// The follower posts once a second. When it has not for `silence`, the hub blanks by itself.
+//
+// Messages without a time that came while this process stood still (SIGSTOP) are of nobody knows
+// when: they are dropped with a note.
+//
+// Requests: GET_STATUS is answered with the newest STATUS and its age by now, GET_CAPABIL with the
+// types that are sent. Other messages go to the sink, in the hub's thread; types that nobody wants
+// are read and dropped.
 #pragma once
 
 #include <atomic>
+#include <chrono>
 #include <cstdint>
 #include <functional>
 #include <memory>
@@ -20,6 +26,7 @@
 #include <vector>
 
 #include "client/tools/bridge/peer.hpp"
+#include "common/core/stopwatch.hpp"
 #include "common/core/error.hpp"
 
 namespace brainshift::client {
@@ -32,12 +39,15 @@ struct HubOptions {
   // What is kept of the messages of own clients, and of `from`.
   igtl::StreamLimits from_peers;
   igtl::StreamLimits from_upstream;
+  // Of the follower, which posts once a second.
+  std::chrono::milliseconds silence{3000};
 };
 
 class Hub {
  public:
   using Tell = std::function<void(const std::string&)>;  // a sentence for people
   using Sink = Peer::Sink;
+  static constexpr std::chrono::milliseconds kStandstill{1000};
 
   // Listens. Errors of Socket::listen.
   static Result<std::unique_ptr<Hub>> open(const HubOptions& options, Tell tell, Sink sink);
@@ -62,6 +72,7 @@ class Hub {
   struct Pending {
     PicturePtr whole;
     PicturePtr state;
+    BootClock::time_point posted;  // the newest of the two
   };
   void wake();
   void take_posts();
@@ -70,6 +81,11 @@ class Hub {
   void serve_peers(const std::vector<short>& events);
   Status answer(Peer& peer, igtl::Message&& message);
   void say_goodbye();
+  // What is known of the follower's word by now.
+  ShownState state_now() const;
+  void blank_in_silence();
+  void watch_standstill(bool anything_came);
+  void hand_on(igtl::Message&& message);
 
   HubOptions options_;
   Tell tell_;
@@ -80,7 +96,12 @@ class Hub {
   std::optional<Upstream> upstream_;
   std::uint32_t message_id_ = 0;
   BroadcastPtr newest_picture_;
+  BroadcastPtr newest_state_broadcast_;  // since the picture; null: none
   PicturePtr newest_state_;
+  BootClock::time_point heard_ = BootClock::now();   // of the follower
+  BootClock::time_point turned_ = BootClock::now();  // the loop
+  bool stood_still_ = false;
+  BroadcastPtr hidden_;  // what a blank picture of the hub's own stands for
   std::atomic<int> peer_count_{0};
   std::atomic<std::uint64_t> replaced_{0};
   std::uint64_t replaced_of_gone_ = 0;

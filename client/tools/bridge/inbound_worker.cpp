@@ -64,11 +64,12 @@ Result<Observation> observation_of(const Found& found, const Followed& followed,
 }
 
 InboundWorker::InboundWorker(Inbox inbox, std::string endpoint, std::optional<ClientKeys> keys,
-                             std::function<void(const std::string&)> tell)
+                             std::function<void(const std::string&)> tell, std::string case_id)
     : inbox_(std::move(inbox)),
       endpoint_(std::move(endpoint)),
       keys_(std::move(keys)),
-      tell_(std::move(tell)) {}
+      tell_(std::move(tell)),
+      pinned_case_(std::move(case_id)) {}
 
 void InboundWorker::post(igtl::Message&& message) {
   const std::size_t bytes = message_bytes(message);
@@ -86,6 +87,10 @@ void InboundWorker::post(igtl::Message&& message) {
 void InboundWorker::follow(const Followed& followed) {
   const std::lock_guard lock(mutex_);
   followed_ = followed;
+  if (pinned_case_.empty()) pinned_case_ = followed.case_id;
+  if (pinned_model_.empty() && followed.case_id == pinned_case_) {
+    pinned_model_ = followed.session.model_id;
+  }
   news_.notify_one();
 }
 
@@ -132,6 +137,15 @@ Status InboundWorker::submit(const Found& found, const std::stop_token& stop) {
     std::unique_lock lock(mutex_);
     news_.wait_for(lock, stop, kForASession, [&] { return followed_.session.session_id != 0; });
     followed = followed_;
+    const bool ours =
+        followed.case_id == pinned_case_ && followed.session.model_id == pinned_model_;
+    if (followed.session.session_id != 0 && !ours) {
+      return invalid(fmt::format(
+          "the daemon serves case {} (model {}), what comes in is of case {} (model {}): start the "
+          "bridge again for another patient or model",
+          followed.case_id, followed.session.model_id, pinned_case_,
+          pinned_model_.empty() ? "none yet" : pinned_model_));
+    }
   }
   if (followed.session.session_id == 0) {
     return fail(ErrorCode::kUnavailable, "no session runs in " + endpoint_);

@@ -6,8 +6,11 @@
 // its own takes them, makes observations (Inbox), and submits them over a connection of its own, so
 // that neither tracing nor a slow daemon holds up what is sent to OpenIGTLink clients.
 //
+// What comes in is of one patient: of `case_id`, and of the first model of it that the daemon
+// serves. Nothing is submitted to another one, after a restart of the daemon for instance.
+//
 // Sequence numbers begin at the milliseconds since 1970, so that they count on when the bridge is
-// started again within a session. Times are of this computer's monotonic clock, from the arrival.
+// started again within a session. Times are of this computer's monotonic clock.
 #pragma once
 
 #include <condition_variable>
@@ -36,7 +39,7 @@ class InboundWorker {
   static constexpr std::size_t kMaxQueuedBytes = std::size_t{256} << 20;
 
   InboundWorker(Inbox inbox, std::string endpoint, std::optional<ClientKeys> keys,
-                std::function<void(const std::string&)> tell);
+                std::function<void(const std::string&)> tell, std::string case_id = {});
 
   // Any thread.
   void post(igtl::Message&& message);
@@ -67,6 +70,7 @@ class InboundWorker {
   std::size_t queued_bytes_ = 0;
   std::uint64_t dropped_ = 0;
   Followed followed_;
+  std::string pinned_case_, pinned_model_;  // empty: none yet
 };
 
 }  // namespace brainshift::client

@@ -8,9 +8,10 @@
 //                                          the code of `brainshift import`
 //
 // Models and points are in model_frame. When that is not Ras, the newest transforms and the
-// constants lead there; a frame that no chain connects is refused with a note.
-// Contours and seeds count the images of a sweep from 0. The files are read when the sweep ends, so
-// that they may be written while it goes on.
+// constants lead there; a frame that no chain connects is refused with a note. Contours and seeds
+// name the images of a sweep by their time (import_boundaries.hpp): a count would be of what
+// another process received. The files are read when the sweep ends, so that they may be written
+// while it goes on.
 //
 // Statistics: as for `brainshift import`; every point's error has standard deviation sd_mm and is
 // taken as independent of the other points' errors.
@@ -18,8 +19,10 @@
 
 #include <chrono>
 #include <filesystem>
+#include <functional>
 #include <map>
 #include <optional>
+#include <set>
 #include <string>
 #include <variant>
 #include <vector>
@@ -33,6 +36,8 @@
 #include "common/values/observation.hpp"
 
 namespace brainshift::client {
+
+std::chrono::nanoseconds wall_time_at(std::chrono::steady_clock::time_point time);
 
 struct InboxOptions {
   std::string tumour_device = {};     // empty: none
@@ -55,6 +60,16 @@ struct InboxOptions {
   double latency_ms = 0.0;
   double max_age_ms = 200.0;
   double sweep_gap_s = 2.0;  // 0.1 to 3600
+  // What was made longer ago than this, by the time in its message, is refused; 0.1 to 3600.
+  double max_data_age_s = 10.0;
+  // Models follow poses that are of their time, within this; 0.01 to 3600.
+  double max_pose_age_s = 1.0;
+  // The messages' times are not of this computer's wall clock, as of a recording that is played:
+  // they are compared with one another alone, and what comes counts as new.
+  bool relative_times = false;
+  // This computer's wall clock at a time of its steady clock, since 1970.
+  std::function<std::chrono::nanoseconds(std::chrono::steady_clock::time_point)> wall_at =
+      wall_time_at;
 
   bool wants_images() const { return !contours.empty() || !seeds.empty(); }
   bool wants_models() const {
@@ -91,12 +106,15 @@ class Inbox {
 
  private:
   explicit Inbox(InboxOptions options);
-  void take_points(const std::string& device, const Points& points,
-                   const std::optional<TriangleSurface>& surface, TimePoint arrived, Taken& taken);
-  void take_landmarks(const std::string& device, const igtl::PointList& list, TimePoint arrived,
-                      Taken& taken);
-  Result<AffineTransform> T_ras_model() const;
-  void keep_transforms(const igtl::Message& message);
+  // When what the message says was so, by its own time; kInvalidArgument: too long ago, or ahead.
+  Result<TimePoint> acquired_at(const igtl::Envelope& envelope, TimePoint arrived) const;
+  bool uses(const igtl::Message& message) const;
+  void take_points(const igtl::Envelope& envelope, const Points& points,
+                   const std::optional<TriangleSurface>& surface, TimePoint acquired, Taken& taken);
+  void take_landmarks(const igtl::Envelope& envelope, const igtl::PointList& list,
+                      TimePoint acquired, Taken& taken);
+  Result<AffineTransform> T_ras_model(TimePoint at) const;
+  void keep_transforms(const igtl::Message& message, TimePoint acquired);
   Taken end_sweep();
   Result<std::vector<ultrasound::Contour>> contours_of(const CollectedSweep& sweep,
                                                        std::vector<std::string>& notes) const;
@@ -104,8 +122,14 @@ class Inbox {
   InboxOptions options_;
   std::vector<tracking::ConstantLink> constants_;
   FrameCollector collector_;
-  std::map<std::string, tracking::ConstantLink> newest_;  // valid transforms, by name
-  std::map<std::string, Vec3> before_;                    // landmarks in RAS
+  struct Pose {
+    tracking::ConstantLink link;
+    TimePoint acquired;
+  };
+  std::map<std::string, Pose> newest_;     // valid transforms, by name
+  std::set<std::string> refused_;          // devices whose times were wrong, as was told
+  std::chrono::nanoseconds image_age_{0};  // of the newest image when it came
+  std::map<std::string, Vec3> before_;     // landmarks in RAS
 };
 
 }  // namespace brainshift::client

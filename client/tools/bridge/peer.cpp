@@ -12,7 +12,8 @@ std::string greeting() {
   envelope.version = 2;
   envelope.device = "brainshift";
   std::string bytes;
-  static_cast<void>(igtl::encode(envelope, igtl::StatusRequest{}, bytes));
+  // No GET_STATUS: it has no content, and OpenIGTLink's receivers read beyond it.
+  static_cast<void>(igtl::encode(envelope, igtl::StatusReport{}, bytes));
   return bytes;
 }
 
@@ -47,13 +48,13 @@ Peer::Peer(Socket socket, igtl::StreamLimits limits)
 
 void Peer::offer(const BroadcastPtr& broadcast) {
   if (!broadcast->whole()) {
-    waiting_state_ = broadcast;
+    waiting_state_ = state_ = broadcast;
     return;
   }
   shown_ = broadcast;
   if (waiting_picture_) ++replaced_;
   waiting_picture_ = broadcast;
-  waiting_state_ = nullptr;
+  waiting_state_ = state_ = nullptr;
 }
 
 Status Peer::reply(const igtl::Envelope& envelope, const igtl::Content& content) {
@@ -111,6 +112,7 @@ void Peer::take_version(std::uint16_t version) {
   if (version < 2 || version_ >= 2) return;
   version_ = 2;
   if (shown_ && !waiting_picture_) waiting_picture_ = shown_;
+  waiting_state_ = state_;
 }
 
 Status Peer::read(const Sink& sink) {

@@ -72,6 +72,7 @@ class Peer {
   std::size_t next_ = 0;  // of its messages
   BroadcastPtr waiting_picture_;
   BroadcastPtr waiting_state_;
+  BroadcastPtr state_;  // the newest since `shown_`; null: none
   std::deque<std::string> replies_;
 
   // The message that is being written: a reply of its own, or one of current_.
@@ -82,8 +83,9 @@ class Peer {
 
 // Upstream: the bridge as an OpenIGTLink client of PlusServer or 3D Slicer.
 //
-// It connects, sends GET_STATUS of version 2, so that PlusServer answers with version 2 (it starts
-// with version 1 for every client), and reads. It connects again by itself. Belongs to one thread.
+// It connects, sends a STATUS of version 2, so that PlusServer answers with version 2 (it starts
+// with version 1 for every client), and reads. It asks for nothing: a GET_STATUS, which has no
+// content, crashes OpenIGTLink's receivers. It connects again by itself. Belongs to one thread.
 class Upstream {
  public:
   using TimePoint = std::chrono::steady_clock::time_point;

@@ -31,6 +31,9 @@ ordered_json to_object(const ShownState& state) {
                          {"reason", state.reason},
                          {"age_ms", nullptr},
                          {"direction", "modeling"},
+                         {"recorded", state.recorded},
+                         {"method", state.method},
+                         {"boundary", state.boundary},
                          {"blank", state.blank},
                          {"has_sd", state.has_sd},
                          {"has_known", state.has_known},
@@ -79,6 +82,10 @@ igtl::StatusReport to_status(const ShownState& state) {
   report.code = igtl::kStatusNotReady;
   report.error_name = "NotReady";
   report.text = state.reason.empty() ? "no current field" : state.reason;
+  if (state.recorded) {
+    report.text = "RECORDED, not the patient now" +
+                  (state.reason.empty() ? std::string() : ": " + state.reason);
+  }
   std::erase(report.text, '\0');
   return report;
 }
@@ -113,9 +120,11 @@ std::string shown_line(const ShownLine& line, bool json) {
   std::string text = fmt::format("update {}", state.sequence);
   text += std::isfinite(state.age_ms) ? fmt::format("  age {:.2f} s", 1e-3 * state.age_ms)
                                       : "  age unknown";
-  text += fmt::format("  {}, {}  {} x {} x {} voxels, {:g} mm, error {:.2f} mm  {:.1f} ms",
-                      state.quality, to_string(state.currency), line.dims[0], line.dims[1],
-                      line.dims[2], state.spacing_mm, state.grid_error_mm, line.made_ms);
+  text +=
+      fmt::format("  {}{}, {}, {}, {}  {} x {} x {} voxels, {:g} mm, error {:.2f} mm  {:.1f} ms",
+                  state.recorded ? "RECORDED, " : "", state.method, state.boundary, state.quality,
+                  to_string(state.currency), line.dims[0], line.dims[1], line.dims[2],
+                  state.spacing_mm, state.grid_error_mm, line.made_ms);
   text += fmt::format("  {} client{}", line.clients, line.clients == 1 ? "" : "s");
   if (line.replaced > 0) text += fmt::format(", {} replaced", line.replaced);
   return text;

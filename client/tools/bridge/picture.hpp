@@ -34,6 +34,9 @@ struct ShownState {
   Currency currency = Currency::kNone;
   std::string reason;  // one sentence for people; empty when current
   double age_ms = std::numeric_limits<double>::quiet_NaN();  // NaN: not known
+  bool recorded = false;       // a recording is played: the field is not the patient's now
+  std::string method;          // of the session; empty without one
+  std::string boundary;        // of the session; empty without one
   bool blank = true;           // the volumes are zero, the surfaces undeformed
   bool has_sd = false;         // the field came with standard deviations
   bool has_known = false;      // and with how much of it is known
@@ -41,16 +44,16 @@ struct ShownState {
   double spacing_mm = 0.0;     // of the grid; 0: there is none yet
   double fade_mm = 0.0;        // before the rim; the field is exact farther inside only
 
-  // The field may be used: it is shown, current, and judged good or with caution.
-  bool usable() const { return !blank && currency == Currency::kCurrent; }
+  // The field may be used: it is shown, current, live, and judged good or with caution.
+  bool usable() const { return !blank && currency == Currency::kCurrent && !recorded; }
 };
 
 // Names of the quality's flags that are set, and "late" for an answer that was, joined by "+".
 std::string flag_names(const Update& update);
 
-// Keys sequence, session_id, model_id, case_id, quality, flags, currency, reason, age_ms (null when
-// not known), direction ("modeling"), blank, has_sd, has_known, grid_error_mm, spacing_mm, fade_mm. UTF-8;
-// bytes that are none are replaced.
+// Keys sequence, session_id, model_id, case_id, quality, flags, currency, reason, age_ms (null
+// when not known), direction ("modeling"), recorded, method, boundary, blank, has_sd, has_known,
+// grid_error_mm, spacing_mm, fade_mm. UTF-8; bytes that are none are replaced.
 std::string to_json(const ShownState& state);
 // The same keys; a number as JSON writes it, an unknown age as "unknown".
 igtl::Metadata to_metadata(const ShownState& state);

@@ -1,9 +1,13 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
+#include <unistd.h>
+
 #include <CLI/CLI.hpp>
+#include <csignal>
 #include <cstdio>
 #include <memory>
 
 #include "client/tools/bridge/bridge.hpp"
+#include "client/tools/bridge/line_queue.hpp"
 #include "client/tools/cli/command.hpp"
 #include "client/tools/monitor/watch.hpp"
 #include "common/io/files/stop_signals.hpp"
@@ -51,10 +55,14 @@ Result<BridgeOptions> read_options(const BridgeArguments& arguments) {
 Status run_bridge(const BridgeArguments& arguments) {
   const auto options = read_options(arguments);
   if (!options) return tl::unexpected(options.error());
-  const auto bridge = Bridge::open(*options, print_line);
+  // A reader that stops must not stop the bridge, nor end it without a blank picture.
+  std::signal(SIGPIPE, SIG_IGN);
+  LineQueue lines(STDOUT_FILENO);
+  const auto bridge =
+      Bridge::open(*options, [&lines](const std::string& line) { lines.tell(line); });
   if (!bridge) return tl::unexpected(bridge.error());
   const Address address = (*bridge)->address();
-  print_line("listening on " + to_string(address));
+  lines.tell("listening on " + to_string(address));
   if (!is_loopback(address)) {
     std::fprintf(stderr,
                  "brainshift: OpenIGTLink has no encryption and no passwords: whoever reaches %s "
@@ -107,10 +115,10 @@ void add_inbound_options(CLI::App& command, BridgeArguments& arguments) {
                    "frame of models and points; transforms lead from there to Ras")
       ->group(group);
   file("--contours", inbox.contours,
-       "traced tumour contours of a sweep's images: .csv frame,u_px,v_px or .json; read when the "
-       "sweep ends");
+       "traced tumour contours of a sweep's images: .csv time_s,u_px,v_px or .json, time_s as in "
+       "the image's message; read when the sweep ends");
   file("--seeds", inbox.seeds,
-       "instead of contours: a point inside the tumour, .csv frame,u_px,v_px");
+       "instead of contours: a point inside the tumour, .csv time_s,u_px,v_px");
   file("--device", inbox.device, "PLUS device set (.xml) with ImageToProbe");
   file("--registration", inbox.registration,
        "T_ras_reference: 16 numbers row by row (text, JSON or YAML)");
@@ -127,6 +135,19 @@ void add_inbound_options(CLI::App& command, BridgeArguments& arguments) {
   number("--surface-sd-mm", inbox.surface_sd_mm, "standard deviation of a surface point, mm");
   number("--landmark-sd-mm", inbox.landmark_sd_mm, "standard deviation of a landmark pair, mm");
   number("--latency-ms", inbox.latency_ms, "how much later images are stamped than seen, ms");
+  number("--max-data-age-s", inbox.max_data_age_s,
+         "refuse what is older than this by the time in its message and this computer's clock, s");
+  number("--max-pose-age-s", inbox.max_pose_age_s,
+         "models follow poses that were seen within this of them, s");
+  command
+      .add_flag("--relative-times", inbox.relative_times,
+                "the times of messages are not of today, as of a recording that is played")
+      ->group(group);
+  command
+      .add_option("--case", arguments.options.case_id,
+                  "what comes in is of this case alone; default: of the first that the daemon "
+                  "serves")
+      ->group(group);
   number("--max-age-ms", inbox.max_age_ms, "poses are not interpolated across a longer gap, ms");
 }
 

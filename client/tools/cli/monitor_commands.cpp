@@ -175,8 +175,9 @@ void add_watch(CLI::App& app, Status& status) {
   brainshift watch --region -30,12,44:50mm --decimate 10mm --no-sd --count 20 --json
 A line: the update's number, the age of its data, the nodes that the viewer now has of the
 mesh (those that travelled, and all bytes of the message), the mean motion of the tumour's
-nodes among them, the verdict on the field, and whether it may be shown as current. Between
-updates a line tells when that changes, e.g. to stale when the daemon is silent.)");
+nodes among them, method, boundary condition, the verdict on the field, and whether it may be
+shown as current; RECORDED when a recording is played. Between updates a line tells when that
+changes, e.g. to aged when all sources are silent, to stale when the daemon is.)");
   command->callback([arguments, &status] { status = run_watch(*arguments); });
 }
 
@@ -191,7 +192,8 @@ void add_status(CLI::App& app, Status& status) {
       R"(Exit status
   0  a session tracks or is ready, and is recorded if a journal is configured
   1  otherwise, with the reason in one line on stderr: no model is loaded, no session runs
-     or it is still being prepared, degraded, not recording, the worker hangs, no answer
+     or it is still being prepared, degraded, the field is aged or has expired, not
+     recording, the worker hangs, no answer
   2  bad usage
 Examples:
   brainshift status
@@ -211,7 +213,8 @@ void add_top(CLI::App& app, Status& status) {
   command->add_flag("--once", options.once, "print one page with the rates of one interval");
   command->footer(
       R"(On a terminal the page is drawn in place; q or Ctrl-C ends it. On a pipe every interval prints
-one line. What needs attention stands in capitals: ATTENTION, STALE, NOT RECORDING, HANGS.
+one line. What needs attention stands in capitals: ATTENTION, AGED,
+EXPIRED, STALE (no answer), RECORDED (a recording is played), NOT RECORDING, HANGS.
 Examples:
   brainshift top
   brainshift top --interval 10 >> brainshift.log

@@ -19,7 +19,7 @@ struct ReplayArguments {
   ReplayOptions options;
   KeyOptions keys;
   std::string speed = "max";
-  std::string boundary = "both";
+  std::string boundary = "contact";
   std::string method;
   double timeout_s = 600.0;
   bool verify = false;
@@ -47,7 +47,7 @@ Status verify(const ReplayOptions& options) {
 Status run_replay(ReplayArguments arguments) {
   ReplayOptions& options = arguments.options;
   options.speed = arguments.speed == "max" ? Speed::kMax : Speed::kRecorded;
-  if (arguments.boundary == "contact") options.boundaries = {Boundary::kContact};
+  if (arguments.boundary == "both") options.boundaries = {Boundary::kContact, Boundary::kFixed};
   if (arguments.boundary == "fixed") options.boundaries = {Boundary::kFixed};
   for (const Method method : kAllMethods) {
     if (arguments.method == to_string(method)) options.method = method;
@@ -92,7 +92,7 @@ void add_replay(CLI::App& app, Status& status) {
                    "max: as fast as answers come; 1x: at the recorded times")
       ->check(CLI::IsMember({"max", "1x"}));
   add_with_default(*command, "--boundary", arguments->boundary,
-                   "brain-skull boundary condition to estimate with")
+                   "brain-skull boundary condition to estimate with; both: one after the other")
       ->check(CLI::IsMember({"contact", "fixed", "both"}));
   arguments->method = to_string(options.method);
   add_with_default(*command, "--method", arguments->method, "how to invert")
@@ -123,7 +123,7 @@ void add_replay(CLI::App& app, Status& status) {
       "  brainshift replay paper.surgery --endpoint tcp://127.0.0.1:5555 --speed max --report "
       "paper.json\n"
       "2,000 updates of a surgery with 20 observations, timed one by one:\n"
-      "  brainshift replay sag.surgery --boundary contact --repeat 100 --latency-csv "
+      "  brainshift replay sag.surgery --repeat 100 --latency-csv "
       "sag_latency.csv --report sag.json\n"
       "After a crash of the daemon, on from the last observation that its journal holds:\n"
       "  brainshift replay sag.surgery --resume journal/colin27-20250131T120000Z-1.surgery "

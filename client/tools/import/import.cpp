@@ -140,9 +140,10 @@ Result<ImportReport> import_recording(const ImportOptions& options, const Progre
   if (!recording) return tl::unexpected(recording.error());
   ImportReport told;
   note_recording(*recording, told.notes);
-  const auto contours = options.seeds.empty()
-                            ? io::read_contours(options.contours, !options.open_contours)
-                            : contours_of_seeds(*recording, options.seeds, told.notes);
+  const auto contours =
+      options.seeds.empty()
+          ? contours_of_file(options.contours, !options.open_contours, nullptr, told.notes)
+          : contours_of_seeds(*recording, options.seeds, told.notes);
   if (!contours) return tl::unexpected(contours.error());
 
   BoundaryOptions boundary;

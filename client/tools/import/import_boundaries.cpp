@@ -4,7 +4,11 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cmath>
+#include <cstdlib>
+#include <limits>
 #include <map>
+#include <optional>
 
 #include "common/io/recording/contour_file.hpp"
 
@@ -69,6 +73,62 @@ Status check_contours(const tracking::Recording& recording,
   return {};
 }
 
+// The live image at that time; nullopt: none came.
+std::optional<int> image_at(const ImageTimes& images, std::int64_t ns) {
+  const auto after = std::lower_bound(images.begin(), images.end(), ns);
+  std::optional<std::size_t> best;
+  std::int64_t nearest_ns = kSameImage_ns + 1, second_ns = std::numeric_limits<std::int64_t>::max();
+  for (const auto& candidate : {after, after == images.begin() ? images.end() : after - 1}) {
+    if (candidate == images.end()) continue;
+    const std::int64_t away_ns = std::abs(*candidate - ns);
+    if (away_ns < nearest_ns) {
+      second_ns = best ? nearest_ns : second_ns;
+      nearest_ns = away_ns;
+      best = static_cast<std::size_t>(candidate - images.begin());
+    } else {
+      second_ns = std::min(second_ns, away_ns);
+    }
+  }
+  if (!best || second_ns == nearest_ns) return std::nullopt;
+  return static_cast<int>(*best);
+}
+
+// Gives every row (Contour, Seed) the number of its image, and leaves out those without.
+template <typename Row>
+Status place(std::vector<Row>& rows, const std::filesystem::path& path, const ImageTimes* images,
+             std::vector<std::string>& notes) {
+  const auto is_timed = [](const Row& row) { return !std::isnan(row.time_s); };
+  if (images == nullptr) {
+    if (std::none_of(rows.begin(), rows.end(), is_timed)) return {};
+    return invalid(path.string() +
+                   ": time_s names live images (brainshift bridge): frames of a recording count "
+                   "from 0");
+  }
+  if (!std::all_of(rows.begin(), rows.end(), is_timed)) {
+    return invalid(path.string() +
+                   ": frames cannot be counted in a live stream: name the images by time "
+                   "(time_s,u_px,v_px)");
+  }
+  const std::size_t given = rows.size();
+  std::size_t missing = 0;  // between the sweep's images
+  std::erase_if(rows, [&](Row& row) {
+    const auto ns = static_cast<std::int64_t>(std::llround(1e9 * row.time_s));
+    const auto image = image_at(*images, ns);
+    if (image) row.frame = *image;
+    if (!image && ns > images->front() && ns < images->back()) ++missing;
+    return !image;
+  });
+  if (missing > 0) {
+    notes.push_back(fmt::format("{}: {} of {} left out: no image came at their time", path.string(),
+                                missing, given));
+  }
+  if (!rows.empty()) return {};
+  return fail(ErrorCode::kEmptySet,
+              fmt::format("{}: none of {} is of an image of this sweep (times {:.3f} to {:.3f} s)",
+                          path.string(), given, 1e-9 * static_cast<double>(images->front()),
+                          1e-9 * static_cast<double>(images->back())));
+}
+
 void append_columns(Points& points, const Points& more) {
   const Eigen::Index before = points.cols();
   points.conservativeResize(3, before + more.cols());
@@ -126,11 +186,22 @@ Result<Boundaries> boundaries_in_ras(const tracking::Recording& recording,
   return result;
 }
 
+Result<std::vector<ultrasound::Contour>> contours_of_file(const std::filesystem::path& path,
+                                                          bool closed, const ImageTimes* images,
+                                                          std::vector<std::string>& notes) {
+  auto contours = io::read_contours(path, closed);
+  if (!contours) return contours;
+  if (auto ok = place(*contours, path, images, notes); !ok) return tl::unexpected(ok.error());
+  return contours;
+}
+
 Result<std::vector<ultrasound::Contour>> contours_of_seeds(const tracking::Recording& recording,
                                                            const std::filesystem::path& path,
-                                                           std::vector<std::string>& notes) {
-  const auto seeds = io::read_seeds(path);
+                                                           std::vector<std::string>& notes,
+                                                           const ImageTimes* images) {
+  auto seeds = io::read_seeds(path);
   if (!seeds) return tl::unexpected(seeds.error());
+  if (auto ok = place(*seeds, path, images, notes); !ok) return tl::unexpected(ok.error());
   std::map<int, ultrasound::TracedContour> best;
   for (const ultrasound::Seed& seed : *seeds) {
     auto sweep = ultrasound::trace_sweep(recording, seed);

@@ -3,6 +3,7 @@
 // sweep; and contours from seeds.
 #pragma once
 
+#include <cstdint>
 #include <filesystem>
 #include <string>
 #include <vector>
@@ -45,12 +46,29 @@ Result<Boundaries> boundaries_in_ras(const tracking::Recording& recording,
                                      std::vector<ultrasound::Contour> contours,
                                      const BoundaryOptions& options = {});
 
-// Contours traced from the seeds of a file, for recorded and for live images.
+// Times of live images, ns since 1970 UTC, ascending. Nobody else counts the images that came: rows
+// of contours and seeds name them by time (time_s of contour_file.hpp). null: a recording, whose
+// frames count from 0.
+using ImageTimes = std::vector<std::int64_t>;
+
+// Two clocks are never compared: both times are the image's own, one of them rounded at most.
+inline constexpr std::int64_t kSameImage_ns = 1'000'000;
+
+// Contours of a file, with `frame` counting the recording's or the live images. A row belongs to
+// the image at its time, within kSameImage_ns and nearer than half way to the next image. Rows
+// without such an image are left out with a note. kInvalidArgument: rows that count live images,
+// or name recorded ones by time; kEmptySet: no row has an image; errors of io::read_contours.
+Result<std::vector<ultrasound::Contour>> contours_of_file(const std::filesystem::path& path,
+                                                          bool closed, const ImageTimes* images,
+                                                          std::vector<std::string>& notes);
+
+// Contours traced from the seeds of a file, for recorded and for live images (contours_of_file).
 // By frame, ascending; where two seeds reach the same image, the more confident contour. notes: for
 // each seed what was traced, and where tracing ended. Errors of io::read_seeds and of
 // ultrasound::trace_sweep, which name the file.
 Result<std::vector<ultrasound::Contour>> contours_of_seeds(const tracking::Recording& recording,
                                                            const std::filesystem::path& path,
-                                                           std::vector<std::string>& notes);
+                                                           std::vector<std::string>& notes,
+                                                           const ImageTimes* images = nullptr);
 
 }  // namespace brainshift::client

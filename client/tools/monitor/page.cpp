@@ -39,15 +39,16 @@ std::string mebibytes(std::uint64_t bytes) {
   return fmt::format("{:.1f} MiB", static_cast<double>(bytes) / 1048576.0);
 }
 
-bool is_stale(const wire::DaemonReport& report) {
-  return report.session.newest_usable > 0 && report.max_age_s > 0.0 &&
-         report.session.age_ms > 1e3 * report.max_age_s;
+FieldAge age_of(const SessionState& state) {
+  return state.newest_usable > 0 ? state.age_of(state.age_ms) : FieldAge::kFresh;
 }
 
 std::string age_text(const wire::DaemonReport& report) {
   if (report.session.newest_usable == 0) return "none yet";
   std::string text = duration_text(1e-3 * report.session.age_ms) + " old";
-  if (is_stale(report)) text += ", STALE";
+  const FieldAge age = age_of(report.session);
+  if (age == FieldAge::kAged) text += ", AGED";
+  if (age == FieldAge::kExpired) text += ", EXPIRED";
   return text;
 }
 
@@ -90,7 +91,10 @@ class Page {
     add("", fmt::format("build {}, {}, BLAS {}", now_.build, now_.machine,
                         now_.blas_kernel.empty() ? "not known" : now_.blas_kernel));
     const auto trouble = complaint(now_);
-    add("verdict", trouble ? "ATTENTION: " + *trouble : "well", trouble.has_value());
+    const bool recorded = now_.session.recorded;
+    add("verdict",
+        (recorded ? "RECORDED, " : "") + (trouble ? "ATTENTION: " + *trouble : std::string("well")),
+        recorded || trouble.has_value());
   }
 
   void add_session() {
@@ -104,12 +108,13 @@ class Page {
       text += fmt::format(", session {}, owner {}", state.session.session_id,
                           now_.owner.empty() ? "nobody" : now_.owner);
     }
+    if (const std::string kind = state.kind(); !kind.empty()) text += ", " + kind;
     if (state.preparing) text += ", another one is being prepared";
-    add("session", text, state.phase == SessionPhase::kDegraded);
+    add("session", text, state.phase == SessionPhase::kDegraded || state.recorded);
     if (!state.reason.empty()) add("", "reason: " + state.reason, true);
     std::string field = age_text(now_);
     if (state.newest_usable > 0) field = fmt::format("update {}, {}", state.newest_usable, field);
-    add("field", field, is_stale(now_));
+    add("field", field, age_of(state) != FieldAge::kFresh);
     std::string worker = "waits";
     if (now_.working_ms > 0.0) worker = "busy for " + duration_text(1e-3 * now_.working_ms);
     if (now_.worker_hangs()) {
@@ -252,7 +257,12 @@ Json to_json(const SessionState& state) {
           {"newest_usable", state.newest_usable},
           {"age_ms", state.newest_usable > 0 ? Json(state.age_ms) : Json(nullptr)},
           {"reason", state.reason},
-          {"preparing", state.preparing}};
+          {"preparing", state.preparing},
+          {"aged_after_ms", state.aged_after_ms},
+          {"expired_after_ms", state.expired_after_ms},
+          {"recorded", state.recorded},
+          {"method", state.method},
+          {"boundary", state.boundary}};
 }
 
 Json to_json(const wire::JournalFigures& journal) {
@@ -291,6 +301,10 @@ std::optional<std::string> complaint(const wire::DaemonReport& report) {
     case SessionPhase::kReady:
     case SessionPhase::kTracking: break;
   }
+  if (const FieldAge age = age_of(report.session); age != FieldAge::kFresh) {
+    return (age == FieldAge::kAged ? "the field is aged: " : "the field has expired: ") +
+           report.session.age_reason(report.session.age_ms);
+  }
   if (report.journal && !report.journal->recording) {
     return "not recording: " + report.journal->reason;
   }
@@ -305,6 +319,7 @@ std::string summary(const Reports& reports) {
   const wire::DaemonReport& now = reports.now;
   const double seconds = seconds_between(reports);
   std::string text = fmt::format("{}, field {}", to_string(now.session.phase), age_text(now));
+  if (const std::string kind = now.session.kind(); !kind.empty()) text += ", " + kind;
   if (seconds > 0.0) {
     text += fmt::format(", {:.1f} updates/s",
                         rate(final_updates(now), final_updates(*reports.before), seconds));

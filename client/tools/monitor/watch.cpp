@@ -80,6 +80,9 @@ std::string json_line(const WatchedUpdate& update) {
                                  {"age_s", number_or_null(update.status.age_s)},
                                  {"currency", to_string(update.status.currency)},
                                  {"reason", update.status.reason},
+                                 {"recorded", update.status.recorded},
+                                 {"method", update.method},
+                                 {"boundary", update.boundary},
                                  {"nodes", update.nodes},
                                  {"mesh_nodes", update.mesh_nodes},
                                  {"received_nodes", update.received_nodes},
@@ -91,6 +94,7 @@ std::string json_line(const WatchedUpdate& update) {
 
 std::string status_text(const FieldStatus& status) {
   std::string text(to_string(status.currency));
+  if (status.recorded) text += ", RECORDED";
   if (!status.reason.empty()) text += ": " + status.reason;
   return text;
 }
@@ -99,6 +103,7 @@ std::string status_line(const FieldStatus& status, bool json) {
   if (!json) return status_text(status);
   const nlohmann::ordered_json line = {{"currency", to_string(status.currency)},
                                        {"reason", status.reason},
+                                       {"recorded", status.recorded},
                                        {"age_s", number_or_null(status.age_s)}};
   return line.dump(-1, ' ', false, nlohmann::ordered_json::error_handler_t::replace);
 }
@@ -137,7 +142,10 @@ class Watcher {
     auto newer = client_.next_update(kForItsAge);
     if (newer) next_ = std::move(newer);
     update.status = client_.field_status();
-    if (next_) update.status = {Currency::kSuperseded, "a newer update has come", std::nan("")};
+    if (next_) {
+      update.status = {Currency::kSuperseded, "a newer update has come", std::nan(""),
+                       update.status.recorded};
+    }
     last_ = update.status.currency;
     tell_(watch_line(update, options_.json));
     ++told_;
@@ -203,6 +211,8 @@ WatchedUpdate watched(const UpdateMessage& message, const std::vector<NodeIndex>
   update.received_nodes = message.received_nodes;
   update.received_bytes = message.received_bytes;
   update.mesh_nodes = mesh_nodes;
+  update.method = to_string(message.update.method);
+  update.boundary = to_string(message.update.boundary);
   if (message.error) {
     update.failure = message.error->message;
     return update;
@@ -236,7 +246,8 @@ std::string watch_line(const WatchedUpdate& update, bool json) {
                       update.received_nodes, 1e-3 * static_cast<double>(update.received_bytes));
   line +=
       update.tumour_mm ? fmt::format("  tumour {:.2f} mm", *update.tumour_mm) : "  no tumour node";
-  line += "  " + update.quality + ", " + status_text(update.status);
+  line += fmt::format("  {}, {}, {}", update.method, update.boundary, update.quality);
+  line += ", " + status_text(update.status);
   if (update.answer_time.late()) line += "  LATE: " + sentence(update.answer_time);
   return line;
 }

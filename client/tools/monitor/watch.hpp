@@ -57,6 +57,7 @@ struct WatchedUpdate {
   std::size_t received_bytes = 0;
   std::optional<double> tumour_mm;  // mean motion of the tumour's nodes among them
   FieldStatus status;               // of the newest usable field, when the line was told
+  std::string method, boundary;     // of the update
 };
 
 // Nodes inside the tumour, ascending; none without a tumour.

@@ -26,7 +26,7 @@ struct ReplayOptions {
   std::string endpoint = "tcp://127.0.0.1:5555";
   std::filesystem::path report;  // report.json to write; replaced if it exists
   Speed speed = Speed::kMax;
-  std::vector<Boundary> boundaries = {Boundary::kContact, Boundary::kFixed};
+  std::vector<Boundary> boundaries = {Boundary::kContact};
   Method method = Method::kCondensed;
   // Only observations of these sources are played; empty: all.
   std::vector<std::string> sources;

@@ -2,6 +2,7 @@
 #include "common/io/config/daemon_file.hpp"
 
 #include <arpa/inet.h>
+#include <fmt/format.h>
 #include <netinet/in.h>
 
 #include <charconv>
@@ -51,7 +52,15 @@ Status validate(const DaemonConfig& config) {
         const std::string& metrics = config.metrics.endpoint;
         return metrics.empty() ? Status() : check_metrics_endpoint(metrics, config.allow_remote);
       })
-      .and_then([&] { return check_security(config); });
+      .and_then([&] { return check_security(config); })
+      .and_then([&] {
+        const AgeConfig& age = config.age;
+        if (age.expired_after_s >= age.aged_after_s) return Status();
+        return Status(
+            invalid(fmt::format("age.expired_after_s = {:g}: must not be below "
+                                "aged_after_s = {:g}",
+                                age.expired_after_s, age.aged_after_s)));
+      });
 }
 
 }  // namespace

@@ -30,6 +30,12 @@ struct LimitsConfig {
   int journal_gib = 64;  // of a session, whoever sends
 };
 
+// Of the data that a field answers, since they were acquired.
+struct AgeConfig {
+  double aged_after_s = 30.0;
+  double expired_after_s = 120.0;  // not below aged_after_s
+};
+
 // What a daemon file says (config/daemon.yaml documents every key).
 struct DaemonConfig {
   std::string endpoint = "tcp://127.0.0.1:5555";  // tcp://HOST:PORT or ipc://PATH
@@ -42,6 +48,7 @@ struct DaemonConfig {
   int max_clients = 32;
   int max_message_mib = 16;
   LimitsConfig limits;
+  AgeConfig age;
   MetricsConfig metrics;
 };
 
@@ -103,6 +110,16 @@ void visit(A& a, V& v) {
        "four updates a second for 18 thousand nodes has 9 GiB."},
       v.limits.journal_gib, between(1, 10000));
   });
+  a.section({"age", "", "From when on a field no longer counts as current", "",
+             "Its age counts from the acquisition of its data."},
+            Need::kOptional, [&] {
+              a({"aged_after_s", "s", "An older field is shown as aged", "",
+                 "Displays say so, and `brainshift status` ends with 1."},
+                v.age.aged_after_s, between(0.1, 1e6));
+              a({"expired_after_s", "s", "An older field is not shown any more", "",
+                 "Not below aged_after_s."},
+                v.age.expired_after_s, between(0.1, 1e6));
+            });
   a.section({"metrics", "", "Figures for monitors, over HTTP in the format of Prometheus", "",
              "The path is /metrics; docs/operations.md lists the figures."},
             Need::kOptional, [&] {

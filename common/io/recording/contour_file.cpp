@@ -4,6 +4,7 @@
 #include <fmt/format.h>
 
 #include <cmath>
+#include <limits>
 #include <nlohmann/json.hpp>
 #include <set>
 
@@ -21,15 +22,27 @@ constexpr int kMaxFrames = 1'000'000;
 struct Row {
   int line = 0;
   int frame = 0;
+  double time_s = std::numeric_limits<double>::quiet_NaN();
   Eigen::Vector2d at_px = Eigen::Vector2d::Zero();
+
+  bool same_image(const Row& other) const {
+    return std::isnan(time_s) ? frame == other.frame : time_s == other.time_s;
+  }
+  std::string image() const {
+    return std::isnan(time_s) ? fmt::format("frame {}", frame) : fmt::format("time {:.6f}", time_s);
+  }
 };
 
-bool parse_row(std::string_view text, Row& row) {
+bool parse_row(std::string_view text, bool timed, Row& row) {
   const auto cells = cells_of(text);
   double frame = 0.0;
   if (cells.size() != 3 || !parse_number(cells[0], frame) ||
       !parse_number(cells[1], row.at_px.x()) || !parse_number(cells[2], row.at_px.y())) {
     return false;
+  }
+  if (timed) {
+    row.time_s = frame;
+    return frame > 0.0;
   }
   if (frame < 0.0 || frame > kMaxFrames || frame != std::floor(frame)) return false;
   row.frame = static_cast<int>(frame);
@@ -38,16 +51,19 @@ bool parse_row(std::string_view text, Row& row) {
 
 Result<std::vector<Row>> read_rows(const std::string& content) {
   std::vector<Row> rows;
-  bool heading_allowed = true;
+  bool heading_allowed = true, timed = false;
   for (const auto& [line, text] : content_lines(content)) {
     const std::string_view cells = trimmed(std::string_view(text).substr(0, text.find('#')));
     Row row;
     row.line = line;
-    const bool heading = heading_allowed && cells == "frame,u_px,v_px";
+    timed = timed || (heading_allowed && cells == "time_s,u_px,v_px");
+    const bool heading = heading_allowed && (timed || cells == "frame,u_px,v_px");
     heading_allowed = false;
     if (heading) continue;
-    if (!parse_row(cells, row)) {
-      return bad_line(line, cells, "must be frame,u_px,v_px with a frame from 0");
+    if (!parse_row(cells, timed, row)) {
+      return bad_line(line, cells,
+                      timed ? "must be time_s,u_px,v_px with a time since 1970"
+                            : "must be frame,u_px,v_px with a frame from 0");
     }
     rows.push_back(row);
   }
@@ -58,16 +74,20 @@ Result<std::vector<Row>> read_rows(const std::string& content) {
 Result<std::vector<ultrasound::Contour>> contours_of_rows(const std::vector<Row>& rows,
                                                           bool closed) {
   std::vector<ultrasound::Contour> contours;
-  std::set<int> finished;
+  std::set<std::pair<int, double>> finished;
+  const auto key = [](const Row& row) {
+    return std::pair(row.frame, std::isnan(row.time_s) ? 0.0 : row.time_s);
+  };
   for (std::size_t first = 0; first < rows.size();) {
     std::size_t end = first;
-    while (end < rows.size() && rows[end].frame == rows[first].frame) ++end;
-    if (!finished.insert(rows[first].frame).second) {
-      return unreadable(fmt::format("line {}: frame {} comes a second time", rows[first].line,
-                                    rows[first].frame));
+    while (end < rows.size() && rows[end].same_image(rows[first])) ++end;
+    if (!finished.insert(key(rows[first])).second) {
+      return unreadable(
+          fmt::format("line {}: {} comes a second time", rows[first].line, rows[first].image()));
     }
     ultrasound::Contour contour;
     contour.frame = rows[first].frame;
+    contour.time_s = rows[first].time_s;
     contour.closed = closed;
     contour.points_px.resize(2, static_cast<Eigen::Index>(end - first));
     for (std::size_t i = first; i < end; ++i) {
@@ -83,14 +103,21 @@ Result<std::vector<ultrasound::Contour>> contours_of_rows(const std::vector<Row>
 std::string read_entry(const json& entry, ultrasound::Contour& contour) {
   if (!entry.is_object()) return "is no object";
   for (const auto& [key, value] : entry.items()) {
-    if (key != "frame" && key != "closed" && key != "points_px")
+    if (key != "frame" && key != "time_s" && key != "closed" && key != "points_px")
       return "key " + key + " is unknown";
   }
+  const auto time = entry.find("time_s");
   const auto frame = entry.find("frame");
-  if (frame == entry.end() || !frame->is_number_unsigned() || *frame > kMaxFrames) {
+  if (time != entry.end()) {
+    if (frame != entry.end()) return "frame and time_s: one of them";
+    if (!time->is_number() || !(time->get<double>() > 0.0))
+      return "time_s must be a time since 1970";
+    contour.time_s = time->get<double>();
+  } else if (frame == entry.end() || !frame->is_number_unsigned() || *frame > kMaxFrames) {
     return "frame must be a whole number from 0";
+  } else {
+    contour.frame = frame->get<int>();
   }
-  contour.frame = frame->get<int>();
   const auto closed = entry.find("closed");
   if (closed != entry.end() && !closed->is_boolean()) return "closed must be true or false";
   contour.closed = closed == entry.end() || closed->get<bool>();
@@ -140,7 +167,7 @@ Result<std::vector<ultrasound::Contour>> read_contours(const fs::path& path, boo
 Result<std::vector<ultrasound::Seed>> read_seeds(const fs::path& path) {
   return parse_file(path, read_rows).map([](const std::vector<Row>& rows) {
     std::vector<ultrasound::Seed> seeds;
-    for (const Row& row : rows) seeds.push_back({row.frame, row.at_px});
+    for (const Row& row : rows) seeds.push_back({row.frame, row.at_px, row.time_s});
     return seeds;
   });
 }

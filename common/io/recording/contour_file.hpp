@@ -3,8 +3,10 @@
 //
 //   .csv   rows frame,u_px,v_px, a heading allowed; the rows of one frame, in order, are a contour
 //   .json  {"contours": [{"frame": 12, "closed": true, "points_px": [[u, v], ...]}, ...]}
-// Frames count from 0; pixels as tracking::Recording has them (orientation MF). '#' begins a
-// comment in a .csv.
+// With time_s in the place of frame (the heading time_s,u_px,v_px; the key "time_s") the image is
+// named by its time, s since 1970 UTC, as OpenIGTLink's messages have it: for live images, which
+// nobody can count. Frames count from 0; pixels as tracking::Recording has them (orientation MF).
+// '#' begins a comment in a .csv.
 #pragma once
 
 #include <filesystem>

@@ -4,6 +4,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
 #include <cctype>
 #include <charconv>
 #include <cmath>
@@ -119,8 +120,12 @@ Status read_frame_fields(const SequenceHeader& header, int count, tracking::Reco
     const auto found = header.frames.find(frame);
     const FrameFields fields = found == header.frames.end() ? FrameFields{} : found->second;
     if (Status ok = read_time(fields, frame, recording.time_s); !ok) return ok;
-    const auto image = fields.find("ImageStatus");
-    recording.image_ok.push_back(image == fields.end() || image->second == "OK" ? 1 : 0);
+    // "Status" is what PLUS calls it in .nrrd files.
+    const bool image_ok = std::ranges::all_of(std::array{"ImageStatus", "Status"}, [&](auto* name) {
+      const auto status = fields.find(name);
+      return status == fields.end() || status->second == "OK";
+    });
+    recording.image_ok.push_back(image_ok ? 1 : 0);
     for (const auto& [name, value] : fields) {
       if (!is_transform(name)) continue;
       if (Status ok = read_link(fields, frame, count, name, recording); !ok) return ok;

@@ -3,9 +3,9 @@
 // sequences (.mha: .igs.mha, .seq.mha) and NRRD sequences (.nrrd), pixels in the same file, raw
 // or compressed, 8 or 16 bit, one channel.
 //
-// Of every frame i: Seq_Frame000i_Timestamp (s), _ImageStatus (OK, INVALID; absent: OK), and for
-// every transform _ProbeToTrackerTransform (16 numbers, row by row) with
-// _ProbeToTrackerTransformStatus (OK; anything else: invalid). A matrix whose status is OK but
+// Of every frame i: Seq_Frame000i_Timestamp (s), _ImageStatus (in PLUS's .nrrd files _Status; OK,
+// INVALID; absent: OK), and for every transform _ProbeToTrackerTransform (16 numbers, row by row)
+// with _ProbeToTrackerTransformStatus (OK; anything else: invalid). A matrix whose status is OK but
 // that is no rigid motion (no invertible map, where a frame of pixels is involved) makes that
 // frame's link invalid and is listed in Recording::defects.
 //

@@ -27,7 +27,9 @@ SCHEMA = {
     "SessionState": {
         "session": (1, "SessionKey"), "phase": (2, "int"), "newest_update": (3, "int"),
         "newest_usable": (4, "int"), "age_ms": (5, "double"), "valid_ms": (6, "int"),
-        "reason": (7, "text"), "preparing": (8, "int"), "recording": (9, "RecordingState")},
+        "reason": (7, "text"), "preparing": (8, "int"), "recording": (9, "RecordingState"),
+        "aged_after_ms": (10, "int"), "expired_after_ms": (11, "int"), "recorded": (12, "int"),
+        "method": (13, "text"), "boundary": (14, "text")},
     "RecordingState": {"recording": (1, "int"), "reason": (2, "text"), "sources": (3, "*RecordedSource")},
     "RecordedSource": {"source": (1, "text"), "until": (2, "int"), "lost_until": (3, "int")},
     "SubscribeRequest": {
@@ -89,7 +91,7 @@ SCHEMA = {
         "misfit_ratio": (29, "?double"), "data_outside_region": (30, "int"),
         "boot_id": (31, "fixed"), "part": (32, "FieldPart"), "answer_time": (33, "AnswerTime"),
         "known": (34, "hex"), "region_known": (35, "?double")},
-    "AnswerTime": {"ms": (1, "double"), "usual_ms": (2, "double"), "late": (3, "int")},
+    "AnswerTime": {"ms": (1, "double"), "usual_ms": (2, "double"), "late": (3, "int"), "age_ms": (4, "double")},
     "LatencyFigures": {
         "count": (1, "int"), "p50_ms": (2, "double"), "p95_ms": (3, "double"), "p99_ms": (4, "double"),
         "max_ms": (5, "double")},
@@ -175,7 +177,9 @@ MESSAGES = {
         "session": KEY, "phase": 5, "newest_update": 12, "newest_usable": 9, "age_ms": 1250.5,
         "valid_ms": 1000, "reason": "observation 12: no point is inside the brain", "preparing": 1,
         "recording": {"recording": 1, "reason": "", "sources": [
-            {"source": "ius", "until": 12, "lost_until": 3}]}}),
+            {"source": "ius", "until": 12, "lost_until": 3}]},
+        "aged_after_ms": 30000, "expired_after_ms": 2**32 - 1, "recorded": 1, "method": "condensed",
+        "boundary": "fixed"}),
     "observation_tumour": (9, 2**63 + 5, "Observation", OBSERVATION | {
         "tumour_boundary": {"points": {"xyz_mm": [12.5, -40.1, 1 / 3, -0.1, 1e-300, 55.0]},
                             "sd_mm": 0.51}}),
@@ -223,7 +227,8 @@ MESSAGES = {
         "left_out": [], "quality": 3, "quality_flags": [1, 17],
         "quality_reason": "elements are turned inside out (133)", "min_volume_ratio": -0.3,
         "inverted_elements": 133, "misfit_ratio": 2.25, "data_outside_region": 7,
-        "answer_time": {"ms": 812.5, "usual_ms": 34.25, "late": 1}, "known": "ff80", "region_known": 0.0}),
+        "answer_time": {"ms": 812.5, "usual_ms": 34.25, "late": 1, "age_ms": 118812.5}, "known": "ff80",
+        "region_known": 0.0}),
     "update_changes": (12, 0, "Update", UPDATE | {
         "status": "converged", "reason": "contact holds", "quality": 1, "quality_flags": [],
         "quality_reason": "", "displacement": {"xyz_mm": [0.5, -0.25, 0.0, 1.75, 3.0, -8.125]},

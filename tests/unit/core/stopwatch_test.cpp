@@ -24,5 +24,13 @@ TEST(Stopwatch, LiesBetweenTheClockReadingsAroundIt) {
   EXPECT_LE(milliseconds, 1e3 * s(outer_end - outer_start));
 }
 
+TEST(BootClock, RunsAtLeastAsLongAsTheMonotonicOne) {
+  const auto before = asleep();
+  const auto first = BootClock::now();
+  EXPECT_GE(before.count(), -1'000'000) << "it leaves nothing out";
+  EXPECT_GE(BootClock::now(), first);
+  EXPECT_LT(asleep() - before, std::chrono::seconds(60)) << "awake: both run alike";
+}
+
 }  // namespace
 }  // namespace brainshift

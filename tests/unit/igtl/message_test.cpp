@@ -96,6 +96,36 @@ TEST(Message, WhatCannotBeSentIsNotEncodedAndTheTypeIsNamed) {
   EXPECT_EQ(message(envelope(), image), "IMAGE: 72 numbers, must be 48");
 }
 
+// Names above 20 bytes, as PlusServer sends them.
+TEST(Message, WholeNamesStandInTheMetadata) {
+  Envelope cut = envelope(2);
+  cut.device = "UltrasoundProbeToTra";
+  cut.metadata = {{"IGTL_DEVICE_NAME", "UltrasoundProbeToTracker"}, {"TransformStatus", "OK"}};
+  EXPECT_EQ(full_device(cut), "UltrasoundProbeToTracker");
+  EXPECT_TRUE(is_named(cut, "UltrasoundProbeToTracker"));
+  EXPECT_FALSE(is_named(cut, "UltrasoundProbeToTrailer"));
+  cut.metadata[0].value = "AnotherNameThatDoesNotBeginSo";
+  EXPECT_EQ(full_device(cut), "UltrasoundProbeToTra");
+  cut.metadata.clear();
+  EXPECT_TRUE(is_named(cut, "UltrasoundProbeToTracker"));
+  cut.device = "Ultrasound";
+  EXPECT_FALSE(is_named(cut, "UltrasoundProbeToTracker"));
+}
+
+TEST(Message, AToolsStateIsThatOfItsWholeName) {
+  Envelope tools = envelope(2);
+  const std::string cut = "UltrasoundProbeToTra";
+  tools.metadata = {{"UltrasoundProbeToTrackerStatus", "OK"}, {"StylusToTrackerStatus", "MISSING"}};
+  EXPECT_EQ(tool_state(tools, cut).name, "UltrasoundProbeToTracker");
+  EXPECT_TRUE(tool_state(tools, cut).valid);
+  EXPECT_FALSE(tool_state(tools, "StylusToTracker").valid);
+  EXPECT_FALSE(tool_state(tools, "OtherToTracker").valid) << "nothing is said of it";
+  tools.metadata.push_back({"UltrasoundProbeToTrailerStatus", "OK"});
+  EXPECT_FALSE(tool_state(tools, cut).valid) << "which of the two?";
+  tools.metadata.clear();
+  EXPECT_TRUE(tool_state(tools, cut).valid) << "a sender without states";
+}
+
 void expect_message_refused(const std::string& bytes, const char* part) {
   test_example::expect_refused(decode(bytes), part);
 }

@@ -172,7 +172,7 @@ UpdateMessage update_from(const json& value) {
                     timings["encode_ms"], timings["journal_ms"]};
   if (value.contains("answer_time")) {
     const json& time = value["answer_time"];
-    update.answer_time = {time["ms"], time["usual_ms"]};
+    update.answer_time = {time["ms"], time["usual_ms"], time["age_ms"]};
     EXPECT_EQ(time["late"] == 1, update.answer_time.late());
   }
   if (value["status"] == "failed") {
@@ -212,7 +212,12 @@ SessionState session_state_from(const json& value) {
           value["valid_ms"],
           value["reason"],
           value["preparing"] == 1,
-          RecordingState{true, "", {{"ius", 12, 3}}}};
+          RecordingState{true, "", {{"ius", 12, 3}}},
+          value.value("aged_after_ms", 0u),
+          value.value("expired_after_ms", 0u),
+          value.value("recorded", 0) == 1,
+          value.value("method", ""),
+          value.value("boundary", "")};
 }
 
 Subscription subscription_from(const json& value) {

@@ -179,6 +179,11 @@ TEST(RoundTrip, SessionMessagesAreReproduced) {
   state.valid_ms = 1000;
   state.reason = "no luck";
   state.preparing = true;
+  state.aged_after_ms = 1;
+  state.expired_after_ms = ~0u;
+  state.recorded = true;
+  state.method = "condensed";
+  state.boundary = "contact";
   state.recording.emplace();
   state.recording->reason = "j.surgery: disk full";
   state.recording->sources = {{"ius", ~0ull, 1}, {"", 0, 0}};

@@ -186,6 +186,7 @@ inline void expect_same(const UpdateMessage& a, const UpdateMessage& b) {
   });
   EXPECT_EQ(a.update.answer_time.ms, b.update.answer_time.ms);
   EXPECT_EQ(a.update.answer_time.usual_ms, b.update.answer_time.usual_ms);
+  EXPECT_EQ(a.update.answer_time.age_ms, b.update.answer_time.age_ms);
   expect_same_matrix(a.update.T_undeformed_deformed.matrix(),
                      b.update.T_undeformed_deformed.matrix());
   const auto& sources = a.update.estimate.sources;

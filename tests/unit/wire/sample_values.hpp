@@ -125,7 +125,7 @@ inline UpdateMessage sample_update() {
                       {"stéréo", 40, -1.0 / 3.0, 300, 0}};
   estimate.sources[1].consistent = false;
   update.timings = {0.1, 1e4, 1e-300, 0.0, 7.0};
-  update.answer_time = {812.5, 34.25};
+  update.answer_time = {812.5, 34.25, 1e5 / 3.0};
   update.T_undeformed_deformed = Eigen::Translation3d(0.1, -2.0 / 3.0, 5.0) *
                                  Eigen::AngleAxisd(0.1, Vec3(1.0, 2.0, 3.0).normalized());
   update.left_out = {{"pore pressure", "updates are 10 s apart", "0.02 %"}, {"", "", ""}};

@@ -10,23 +10,31 @@ from __future__ import annotations
 import enum
 import json
 import math
+import time
 from dataclasses import dataclass
 from typing import Any, Callable, Mapping, Optional
 
 KEYS = ("sequence", "session_id", "model_id", "case_id", "quality", "flags", "currency", "reason", "age_ms", "direction",
-        "blank", "has_sd", "grid_error_mm", "spacing_mm", "fade_mm")
+        "recorded", "method", "boundary", "blank", "has_sd", "grid_error_mm", "spacing_mm", "fade_mm")
 OPTIONAL_KEYS = ("has_known",)  # of newer bridges
 ATTRIBUTE_PREFIX = "OpenIGTLink."  # how SlicerOpenIGTLink names the attribute of a metadata entry
 LONGEST_STATE = 65536  # characters; the bridge needs less than a thousand
 QUALITIES = ("good", "caution", "unusable", "none")
-# The words of client/lib/field_status.hpp. Of a field that is superseded a newer one is a moment away; it is shown in
-# amber. The bridge blanks the field in place of the last three.
-CURRENCIES = ("current", "superseded", "degraded", "stale", "none")
-SHOWN_CURRENCIES = ("current", "superseded")
+# The words of client/lib/field_status.hpp. Of a field that is superseded a newer one is a moment away, an aged one has old
+# data; they are shown in amber. The bridge blanks the field in place of the others.
+CURRENCIES = ("current", "superseded", "aged", "expired", "degraded", "stale", "none")
+SHOWN_CURRENCIES = ("current", "superseded", "aged")
 # The state travels in front of its field. Until the field has come, the one before it is shown, for so long at most.
 BEHIND_S = 0.5
 NO_SESSION = ("", "0")
 DIRECTION = "modeling"  # u moves undeformed -> deformed: Slicer's "to parent"
+
+
+def boot_time() -> float:
+    """A monotonic clock, s, that runs while the computer sleeps where there is one."""
+    if hasattr(time, "CLOCK_BOOTTIME"):
+        return time.clock_gettime(time.CLOCK_BOOTTIME)
+    return time.monotonic()
 
 
 class LabelError(ValueError):
@@ -43,8 +51,11 @@ class Label:
     flags: str
     currency: str
     reason: str
-    age_ms: Optional[float]  # of the observation, when the label was written; None: not known
+    age_ms: Optional[float]  # since its data were acquired, when the label was written; None: not known
     direction: str
+    recorded: bool  # a recording is played: the field is not the patient's now
+    method: str
+    boundary: str
     blank: bool   # the volumes are zero and the surfaces undeformed, since there is nothing to be shown
     has_sd: bool  # False: the standard deviations are zero because nobody sent any
     has_known: bool  # False: the same of how much the data say
@@ -89,6 +100,9 @@ def _label(values: Mapping[str, Any]) -> Label:
         reason=_text("reason", values["reason"]),
         age_ms=_length("age_ms", values["age_ms"]),
         direction=_text("direction", values["direction"]),
+        recorded=_truth("recorded", values["recorded"]),
+        method=_text("method", values["method"]),
+        boundary=_text("boundary", values["boundary"]),
         blank=_truth("blank", values["blank"]),
         has_sd=_truth("has_sd", values["has_sd"]),
         has_known=_truth("has_known", values.get("has_known", False)),
@@ -171,11 +185,14 @@ def may_be_shown(field: Optional[Label], state: Optional[Label], pinned_model: s
     if reason:
         return Verdict(Light.RED, reason)
     assert field is not None and state is not None
-    if field.sequence != state.sequence:
-        return Verdict(Light.AMBER, "the next field is on its way")
-    if state.currency != "current":
-        return Verdict(Light.AMBER, state.reason or state.currency)
     reasons = []
+    if state.recorded or field.recorded:
+        reasons.append("RECORDED, not the patient now")
+    if field.sequence != state.sequence:
+        return Verdict(Light.AMBER, "; ".join([*reasons, "the next field is on its way"]))
+    if state.currency != "current":
+        word = f"{state.currency}: {state.reason}" if state.reason else state.currency
+        return Verdict(Light.AMBER, "; ".join([*reasons, word]))
     if "late" in field.flags.split("+"):
         reasons.append("answered late: it took more than twice what is usual")
     if "caution" in (field.quality, state.quality):

@@ -226,6 +226,43 @@ TEST(Client, KeepsTheLatestUsableFieldOfWhatItHandedOut) {
   EXPECT_FALSE(client.latest_usable()) << "of the session before";
 }
 
+TEST(Client, UpdatesThatWaitEndWithTheirSession) {
+  FakeDaemon daemon([](const Frame& request) -> Answers {
+    const auto of_session = [](std::uint64_t session) {
+      UpdateMessage message = small_update(1, Quality::kGood);
+      message.session_id = session;
+      message.boot_id = 7;
+      return encode_frame(MessageType::kUpdate, 0, encode(message));
+    };
+    if (request.type != MessageType::kStartSessionRequest) return {};
+    SessionInfo info;
+    info.boot_id = 7;
+    info.session_id = request.request_id;
+    return {of_session(request.request_id - 1),
+            encode_frame(MessageType::kStartSessionReply, request.request_id, encode(info)),
+            of_session(request.request_id)};
+  });
+  Client client = connect(daemon.endpoint());
+  ASSERT_TRUE(client.start_session({.case_id = "c"}));
+  ASSERT_TRUE(client.start_session({.case_id = "c", .takeover = true}));
+  EXPECT_EQ(client.next_update(kPatience).value().session_id, 2u);
+  EXPECT_EQ(client.latest_usable()->session_id, 2u);
+}
+
+TEST(Client, AFieldOfAnotherMeshIsRefused) {
+  FakeDaemon daemon([](const Frame& request) -> Answers {
+    SessionInfo info;
+    info.nodes = 10;
+    return {encode_frame(MessageType::kStartSessionReply, request.request_id, encode(info)),
+            update_frame(1)};
+  });
+  Client client = connect(daemon.endpoint());
+  ASSERT_TRUE(client.start_session({.case_id = "c"}));
+  expect_error(client.next_update(kPatience), ErrorCode::kProtocol,
+               "of a mesh of 2 nodes, the model has 10");
+  EXPECT_FALSE(client.latest_usable());
+}
+
 TEST(Client, ABadUpdateIsReportedByNextUpdateAndNotByTheRequestItMet) {
   FakeDaemon daemon([](const Frame& request) -> Answers {
     return {encode_frame(MessageType::kUpdate, 0, "\xff"), status_reply(request.request_id),

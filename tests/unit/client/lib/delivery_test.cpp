@@ -59,7 +59,7 @@ class Scripted {
     state.session = {7, 1, "model"};
     state.phase = SessionPhase::kTracking;
     state.newest_update = state.newest_usable = 1;
-    state.valid_ms = 60000;
+    state.valid_ms = SessionState::kMaxValidity_ms;
     Answers answers = {
         encode_frame(MessageType::kSessionState, request.request_id, wire::encode(state))};
     if (news) {

@@ -72,6 +72,37 @@ TEST_F(SessionWatchTest, AStateThatNobodyAskedForIsNewsButNoProof) {
   EXPECT_EQ(judge(milliseconds(500), 6).currency, Currency::kCurrent);
 }
 
+// The limits are the daemon's; a field ages between its answers too.
+TEST_F(SessionWatchTest, AnOldFieldIsAgedThenExpiredAndNeverCurrent) {
+  SessionState state = tracking(5);
+  state.age_ms = 29'500.0;
+  state.aged_after_ms = 30'000;
+  state.expired_after_ms = 30'300;
+  hear(milliseconds(0), state);
+  EXPECT_EQ(judge(milliseconds(400)).currency, Currency::kCurrent);
+  const FieldStatus aged = judge(milliseconds(600));
+  EXPECT_EQ(aged.currency, Currency::kAged);
+  EXPECT_EQ(aged.reason, "its data are 30.1 s old: 30 s at most");
+  const FieldStatus expired = judge(milliseconds(900));
+  EXPECT_EQ(expired.currency, Currency::kExpired);
+  EXPECT_EQ(expired.reason, "its data are 30.4 s old: 30.3 s at most");
+  state.newest_update = 6;
+  state.reason = "no point";
+  hear(milliseconds(0), state);
+  EXPECT_EQ(judge(milliseconds(600)).currency, Currency::kDegraded);
+  EXPECT_EQ(judge(milliseconds(900)).currency, Currency::kExpired);
+}
+
+TEST_F(SessionWatchTest, ARecordingIsToldWithEveryStatus) {
+  SessionState state = tracking(5);
+  hear(milliseconds(0), state);
+  EXPECT_FALSE(judge(milliseconds(10)).recorded);
+  state.recorded = true;
+  hear(milliseconds(0), state);
+  EXPECT_TRUE(judge(milliseconds(10)).recorded);
+  EXPECT_TRUE(judge(milliseconds(5000)).recorded);
+}
+
 TEST_F(SessionWatchTest, AFailureSinceDegradesItWithItsReason) {
   SessionState state = tracking(5);
   state.newest_update = 6;
@@ -89,6 +120,19 @@ TEST_F(SessionWatchTest, AFieldNewerThanTheStateIsCurrentAndItsAgeIsNotKnown) {
   const FieldStatus newer = judge(milliseconds(10), 6);
   EXPECT_EQ(newer.currency, Currency::kCurrent);
   EXPECT_TRUE(std::isnan(newer.age_s));
+}
+
+// Data that were 118 s on their way: nobody has to wait for the daemon's next word.
+TEST_F(SessionWatchTest, AFieldNewerThanTheStateIsAsOldAsItsUpdateSays) {
+  SessionState state = tracking(5);
+  state.aged_after_ms = 30'000;
+  hear(milliseconds(0), state);
+  const auto judged = [&](double own_age_s) {
+    return watch_.judge(std::pair{kWatchedKey, std::uint64_t{6}}, "e", zero_, own_age_s);
+  };
+  EXPECT_EQ(judged(118.0).currency, Currency::kAged);
+  EXPECT_EQ(judged(118.0).age_s, 118.0);
+  EXPECT_EQ(judged(1.0).currency, Currency::kCurrent);
 }
 
 TEST_F(SessionWatchTest, AFieldOfAnotherSessionOrDaemonIsNone) {

@@ -65,7 +65,8 @@ TEST_F(DaemonFileKeys, EveryKeyArrivesInItsField) {
       "max_message_mib: 5\nallow_remote: true\nmetrics: {endpoint: '127.0.0.2:80'}\n"
       "security:\n  secret_key: k\n  allow_list: a\n"
       "limits:\n  connections: 4\n  observations_per_s: 6\n  session_starts_per_min: 7\n  "
-      "journal_gib: 8\n"));
+      "journal_gib: 8\n"
+      "age: {aged_after_s: 8, expired_after_s: 9.5}\n"));
   EXPECT_EQ(config.endpoint, "ipc:///tmp/s");
   EXPECT_TRUE(config.allow_remote);
   EXPECT_EQ(config.model, folder_ / "m.h5");
@@ -76,6 +77,8 @@ TEST_F(DaemonFileKeys, EveryKeyArrivesInItsField) {
   EXPECT_EQ(config.metrics.endpoint, "127.0.0.2:80");
   EXPECT_EQ(config.security.secret_key, folder_ / "k");
   EXPECT_EQ(config.security.allow_list, folder_ / "a");
+  EXPECT_EQ(config.age.aged_after_s, 8.0);
+  EXPECT_EQ(config.age.expired_after_s, 9.5);
   EXPECT_EQ(config.limits.connections, 4);
   EXPECT_EQ(config.limits.observations_per_s, 6);
   EXPECT_EQ(config.limits.session_starts_per_min, 7);
@@ -89,6 +92,9 @@ TEST_F(DaemonFileKeys, BadValuesAreRefusedWithFileLineAndKey) {
        {"max_clients: many", "d.yaml:1: max_clients = many: must be an integer"},
        {"max_clients: 0", "d.yaml:1: max_clients = 0: must be between 1 and 1024"},
        {"max_clients: 1025", "d.yaml:1: max_clients = 1025: must be"},
+       {"age: {aged_after_s: 0}", "aged_after_s = 0: must be between 0.1 and 1e+06"},
+       {"age: {aged_after_s: 8, expired_after_s: 7}",
+        "age.expired_after_s = 7: must not be below aged_after_s = 8"},
        {"max_message_mib: 0", "d.yaml:1: max_message_mib = 0: must be between 1 and 64"},
        {"max_message_mib: 65", "d.yaml:1: max_message_mib = 65: must be"},
        {"log_level: loud",

@@ -41,6 +41,32 @@ TEST(ContourFile, CsvGroupsRowsByFrame) {
   EXPECT_EQ(contours[1].frame, 8);
 }
 
+// Live images have a time, and nobody counts them.
+TEST(ContourFile, ImagesMayBeNamedByTheirTime) {
+  const TemporaryFolder folder;
+  const auto contours = value_or_fail(read_contours(
+      folder.write("c.csv",
+                   "time_s,u_px,v_px\n1760000000.25,1,2\n1760000000.25,3,4\n1760000000.5,5,6\n"),
+      true));
+  ASSERT_EQ(contours.size(), 2U);
+  EXPECT_EQ(contours[0].time_s, 1760000000.25);
+  EXPECT_EQ(contours[0].points_px.cols(), 2);
+  EXPECT_EQ(contours[1].time_s, 1760000000.5);
+  const auto from_json = value_or_fail(read_contours(
+      folder.write("c.json", R"({"contours": [{"time_s": 1.5, "points_px": [[1, 2]]}]})"), true));
+  EXPECT_EQ(from_json[0].time_s, 1.5);
+  const auto seeds =
+      value_or_fail(read_seeds(folder.write("s.csv", "time_s,u_px,v_px\n7.5,1,2\n")));
+  EXPECT_EQ(seeds[0].time_s, 7.5);
+  expect_refused(reading_contours("c.csv"),
+                 {{"time_s,u_px,v_px\n0,1,2\n", "line 2: \"0,1,2\" must be time_s,u_px,v_px"},
+                  {"time_s,u_px,v_px\n1.5,1,2\n2.5,1,2\n1.5,1,2\n", "line 4: time 1.5"}});
+  expect_refused(reading_contours("c.json"),
+                 {{R"({"contours": [{"time_s": 1, "frame": 1, "points_px": []}]})",
+                   "contours[0]: frame and time_s: one of them"},
+                  {R"({"contours": [{"time_s": 0, "points_px": []}]})", "time_s must be a time"}});
+}
+
 TEST(ContourFile, JsonSaysWhetherEachContourIsClosed) {
   const TemporaryFolder folder;
   const auto contours = read_contours(

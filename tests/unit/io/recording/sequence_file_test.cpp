@@ -174,6 +174,7 @@ TEST(SequenceFile, StatusDecides) {
   const TemporaryFolder folder;
   SequenceContent content = small_sweep().content();
   content.frames[0]["ImageStatus"] = "INVALID";
+  content.frames[3]["Status"] = "INVALID";  // as PLUS writes .nrrd files
   content.frames[1].erase("ProbeToTrackerTransformStatus");
   content.frames[2]["ProbeToTrackerTransformStatus"] = "OUT_OF_VIEW";
   content.frames[3].erase("ProbeToTrackerTransform");
@@ -181,6 +182,7 @@ TEST(SequenceFile, StatusDecides) {
       value_or_fail(read_sequence(folder.write("a.mha", meta_text(content, true))));
   EXPECT_FALSE(recording.image_ok[0]);
   EXPECT_TRUE(recording.image_ok[1]);
+  EXPECT_FALSE(recording.image_ok[3]);
   const auto& samples = find_link(recording, "ProbeToTracker")->samples;
   EXPECT_EQ(samples[0].status, LinkStatus::kOk);
   EXPECT_EQ(samples[1].status, LinkStatus::kWithoutStatus);

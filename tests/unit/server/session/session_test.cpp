@@ -55,7 +55,7 @@ class SessionTest : public testing::Test {
     act();
   }
   Result<Admission> submit(Observation observation) {
-    auto admission = session_.submit(std::move(observation), now_);
+    auto admission = session_.submit(std::move(observation), now_, {}, 0s);
     act();
     return admission;
   }
@@ -106,7 +106,7 @@ class SessionTest : public testing::Test {
     EXPECT_TRUE(submit(observation).has_value());
     return answer();
   }
-  Session::State state() const { return session_.state(now_); }
+  Session::State state() const { return session_.state(now_, 0s); }
   // A session that is asked for, made ready and begun.
   Result<SessionInfo> start(Boundary boundary = Boundary::kContact) {
     ask(request(boundary));
@@ -512,6 +512,39 @@ TEST_F(RunningSession, AMethodWithAFactorEndsBeforeTheNextSessionIsPrepared) {
 }
 
 // ---------- what is told of it ----------
+
+// 118 s on the way, then waiting here, then the computer asleep: each is age.
+TEST_F(RunningSession, AgeCountsFromAcquisitionAndWhileTheComputerSleeps) {
+  Observation first = landmarks(1);
+  first.acquired_ns = first.sent_ns = 1'000'000'000;
+  answer(first);
+  Observation late = landmarks(2);
+  late.acquired_ns = 2'000'000'000;
+  late.sent_ns = late.acquired_ns + 100'000'000'000;
+  now_ += 101s;
+  ASSERT_TRUE(session_.submit(late, now_, 5s).has_value());
+  act();
+  answer();
+  now_ += 3s;
+  EXPECT_NEAR(session_.state(now_, 5s).shared.age_ms, 103e3, 1.0);
+  EXPECT_NEAR(session_.state(now_, 605s).shared.age_ms, 703e3, 1.0);
+}
+
+TEST_F(SessionTest, ARecordingSaysSoAndItsMethodAndBoundary) {
+  SessionRequest recorded = request(Boundary::kFixed);
+  recorded.recorded_clock = true;
+  ask(recorded);
+  prepare(*next_preparation());
+  next_job();
+  const SessionState said = state().shared;
+  EXPECT_TRUE(said.recorded);
+  EXPECT_EQ(said.kind(), "RECORDED, paper, fixed");
+  Observation old = landmarks(1);
+  old.acquired_ns = 5;
+  answer(old);
+  now_ += 2s;
+  EXPECT_EQ(state().shared.age_ms, 2e3) << "since it was played";
+}
 
 TEST_F(RunningSession, WorkIsTimedFromWhenItIsHandedOutUntilItIsPublished) {
   EXPECT_EQ(state().working_s, 0.0);

@@ -114,6 +114,42 @@ TEST_F(HubOnLoopback, AnswersRequestsInTheClientsVersion) {
   FAIL() << "never version 2";
 }
 
+// The follower's thread hangs: GET_STATUS and the volumes say so, until it posts again.
+TEST_F(HubOnLoopback, BlanksByItselfWhenItsFollowerFallsSilent) {
+  HubOptions options;
+  options.silence = std::chrono::milliseconds(300);
+  serve(options);
+  post(1);
+  IgtlPeer viewer = client();
+  EXPECT_EQ(first_voxel(viewer.receive_from("brainshift_u")), 1.0F);
+  EXPECT_EQ(first_voxel(viewer.receive_from("brainshift_u")), 0.0F);
+  igtl::Envelope envelope;
+  viewer.send(envelope, igtl::StatusRequest{});
+  const auto status = viewer.receive_from("brainshift");
+  ASSERT_TRUE(status);
+  const auto& report = std::get<igtl::StatusReport>(status->message.content);
+  EXPECT_EQ(report.code, igtl::kStatusNotReady);
+  EXPECT_THAT(report.text, HasSubstr("has not looked at the daemon for"));
+  hub->post(picture(1), Broadcast::Part::kState);
+  EXPECT_EQ(first_voxel(viewer.receive_from("brainshift_u")), 1.0F) << "what stood comes back";
+}
+
+TEST_F(HubOnLoopback, ANewClientLearnsTheNewestAge) {
+  serve();
+  post(1);
+  auto later = std::make_shared<Picture>(*picture(1));
+  later->state.age_ms = 4321.0;
+  IgtlPeer first = client();
+  ASSERT_TRUE(first.receive_from("brainshift_u"));
+  hub->post(later, Broadcast::Part::kState);
+  ASSERT_TRUE(first.receive_from("brainshift_state"));
+  IgtlPeer second = client();
+  ASSERT_TRUE(second.receive_from("brainshift_u"));
+  const auto said = second.receive_from("brainshift_state");
+  ASSERT_TRUE(said);
+  EXPECT_THAT(std::get<igtl::Text>(said->message.content).text, HasSubstr("\"age_ms\":4321"));
+}
+
 TEST_F(HubOnLoopback, BlanksBeforeItEnds) {
   serve();
   post(1);
@@ -178,8 +214,8 @@ TEST_F(HubOnLoopback, HandsOnWhatItsClientsSend) {
   EXPECT_EQ(received.get_future().get().envelope.device, "TumourNow");
 }
 
-// The bridge as a client: it asks in version 2 first, and comes back after the server has gone.
-TEST_F(HubOnLoopback, AsksAServerForVersionTwoAndConnectsAnew) {
+// The bridge as a client: it speaks version 2 first, and comes back after the server has gone.
+TEST_F(HubOnLoopback, GreetsAServerInVersionTwoAndConnectsAnew) {
   IgtlListener plus;
   HubOptions options;
   options.from = Address{"127.0.0.1", plus.port()};
@@ -190,10 +226,10 @@ TEST_F(HubOnLoopback, AsksAServerForVersionTwoAndConnectsAnew) {
     const auto greeting = server.receive();
     ASSERT_TRUE(greeting);
     EXPECT_EQ(greeting->header.version, 2);
-    EXPECT_EQ(greeting->header.type, "GET_STATUS");
+    EXPECT_EQ(greeting->header.type, "STATUS") << "a GET_STATUS crashes OpenIGTLink's receivers";
   }
   IgtlPeer server = plus.accept();
-  EXPECT_EQ(server.receive()->header.type, "GET_STATUS");
+  EXPECT_EQ(server.receive()->header.type, "STATUS");
   igtl::Envelope envelope;
   envelope.version = 2;
   envelope.device = "ProbeToTracker";

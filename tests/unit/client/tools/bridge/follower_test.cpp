@@ -24,7 +24,10 @@ TEST(Follower, ShowsACurrentFieldOnceAndBlanksEverythingElseOnce) {
   EXPECT_EQ(change_of(status(Currency::kCurrent), 5, 4, Currency::kCurrent), Change::kShow);
   EXPECT_EQ(change_of(status(Currency::kCurrent), 5, 5, Currency::kCurrent), Change::kNone);
   EXPECT_EQ(change_of(status(Currency::kSuperseded), 5, 5, Currency::kCurrent), Change::kNone);
-  for (const Currency bad : {Currency::kNone, Currency::kDegraded, Currency::kStale}) {
+  EXPECT_EQ(change_of(status(Currency::kAged), 5, 5, Currency::kCurrent), Change::kNone);
+  EXPECT_EQ(change_of(status(Currency::kAged), 5, 0, Currency::kNone), Change::kShow);
+  for (const Currency bad :
+       {Currency::kNone, Currency::kDegraded, Currency::kStale, Currency::kExpired}) {
     EXPECT_EQ(change_of(status(bad), 5, 5, Currency::kCurrent), Change::kBlank);
     EXPECT_EQ(change_of(status(bad), 5, 0, bad), Change::kNone) << "it is blank, for that reason";
     EXPECT_EQ(change_of(status(Currency::kCurrent), 5, 0, bad), Change::kShow) << "the same again";
@@ -207,6 +210,38 @@ TEST_F(FollowedDaemon, BlanksAtAnUnusableFieldSaysWhyAndShowsTheNextUsableOne) {
     newest = update(3, Quality::kCaution);
   });
   EXPECT_EQ(shown(3)->state.quality, "caution");
+}
+
+TEST_F(FollowedDaemon, SaysThatAFieldIsAgedAndBlanksItWhenItHasExpired) {
+  shown(1);
+  change([&] {
+    state.aged_after_ms = 30'000;
+    state.expired_after_ms = 60'000;
+    state.age_ms = 35'000.0;
+  });
+  const PicturePtr aged =
+      wait_for(states, [](const Picture& said) { return said.state.currency == Currency::kAged; });
+  EXPECT_THAT(aged->state.reason, HasSubstr("s old: 30 s at most"));
+  EXPECT_FALSE(aged->state.usable());
+  EXPECT_FALSE(aged->state.blank);
+  change([&] { state.age_ms = 61'000.0; });
+  EXPECT_THAT(blank(Currency::kExpired)->state.reason, HasSubstr("s old: 60 s at most"));
+}
+
+TEST_F(FollowedDaemon, ARecordingIsNeverUsableAndSaysWhatItIs) {
+  change([&] {
+    state.recorded = true;
+    state.method = "condensed";
+    state.boundary = "fixed";
+    state.session.session_id = 2;
+    newest.session_id = 2;
+  });
+  const PicturePtr picture = wait_for(pictures, [](const Picture& each) {
+    return each.state.recorded && each.state.sequence == 1;
+  });
+  EXPECT_EQ(picture->state.boundary, "fixed");
+  EXPECT_FALSE(picture->state.usable());
+  EXPECT_THAT(to_status(picture->state).text, HasSubstr("RECORDED"));
 }
 
 TEST_F(FollowedDaemon, BlanksWhenTheSessionEnds) {

@@ -94,14 +94,20 @@ TEST(FrameCollector, ValidityIsWhatTheMetadataSaysAndWithoutThemTheSendersWord) 
   tools.tools = {{"Probe", igtl::ToolType::k6d, moved(4.0F)},
                  {"StylusToTracker", igtl::ToolType::k6d, moved(5.0F)}};
   auto tdata = message("Tools", 1000, tools);
-  tdata.envelope.metadata.push_back({"StylusToTrackerStatus", "INVALID"});
+  tdata.envelope.metadata = {{"ProbeStatus", "OK"}, {"StylusToTrackerStatus", "INVALID"}};
   collector.take(tdata, kBegin);
+  auto cut = transform("UltrasoundProbeToTra", 1000, 6.0F, "OK");
+  cut.envelope.metadata.push_back({"IGTL_DEVICE_NAME", "UltrasoundProbeToTracker"});
+  collector.take(cut, kBegin);
   const CollectedSweep sweep = collector.finish();
   EXPECT_EQ(link(sweep.moments, "AToB").samples[0].status, LinkStatus::kOk);
   EXPECT_EQ(link(sweep.moments, "BToC").samples[0].status, LinkStatus::kOk);
   EXPECT_EQ(link(sweep.moments, "CToD").samples[0].status, LinkStatus::kInvalid);
   EXPECT_EQ(link(sweep.moments, "ProbeToTracker").samples[0].T_to_from.translation()[0], 4.0);
   EXPECT_EQ(link(sweep.moments, "StylusToTracker").samples[0].status, LinkStatus::kInvalid);
+  EXPECT_EQ(link(sweep.moments, "UltrasoundProbeToTracker").samples[0].status, LinkStatus::kOk);
+  EXPECT_EQ(sweep.image_ns, std::vector<std::int64_t>{1'000'000'000});
+  EXPECT_FALSE(sweep.untimed);
 }
 
 TEST(FrameCollector, AMatrixThatIsNoMotionIsInvalidWhateverItsStatus) {

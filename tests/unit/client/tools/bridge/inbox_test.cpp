@@ -1,9 +1,12 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Submitting to a daemon: tests/integration/test_bridge.py.
+#include <fmt/format.h>
 #include <gmock/gmock.h>
 
 #include <fstream>
 #include <future>
+#include <random>
+#include <set>
 #include <thread>
 
 #include "client/tools/bridge/inbound_worker.hpp"
@@ -26,6 +29,11 @@ using testing::IsEmpty;
 using testing::SizeIs;
 
 const Inbox::TimePoint kInboxBegin{std::chrono::hours(1)};
+
+// The wall clock of these tests, since 1970: 5 s at kInboxBegin.
+std::chrono::nanoseconds inbox_wall(Inbox::TimePoint at) {
+  return at - kInboxBegin + std::chrono::seconds(5);
+}
 
 igtl::Message inbox_message(const std::string& device, igtl::Content content) {
   igtl::Message made;
@@ -120,6 +128,55 @@ TEST(Inbox, ModelsOfAnotherFrameFollowTheNewestTransforms) {
       << "the pose is not known any more";
 }
 
+// A model that was made an hour ago, or that says so, is not the brain's now.
+TEST(Inbox, WhatIsOldByItsOwnTimeIsRefusedOnceAndTheRestHasThatTime) {
+  Inbox inbox = Inbox::open({.tumour_device = "T", .wall_at = inbox_wall}).value();
+  auto model = inbox_message("T", points({{"a", Vec3(1, 2, 3)}}));
+  const auto at = kInboxBegin + std::chrono::hours(1);
+  model.envelope.timestamp = igtl::to_timestamp(std::chrono::seconds(5));
+  EXPECT_THAT(inbox.take(model, at).notes,
+              ElementsAre(HasSubstr("T: its time is 3600.0 s behind this computer's clock")));
+  EXPECT_THAT(inbox.take(model, at).notes, IsEmpty()) << "told once";
+  model.envelope.timestamp = igtl::to_timestamp(inbox_wall(at) + std::chrono::seconds(5));
+  EXPECT_THAT(inbox.take(model, at).found, IsEmpty()) << "ahead";
+  model.envelope.timestamp = igtl::to_timestamp(inbox_wall(at) - milliseconds(1500));
+  const Taken taken = inbox.take(model, at);
+  ASSERT_THAT(taken.found, SizeIs(1));
+  EXPECT_EQ(taken.found[0].acquired, at - milliseconds(1500));
+  Inbox relative =
+      Inbox::open({.tumour_device = "T", .relative_times = true, .wall_at = inbox_wall}).value();
+  model.envelope.timestamp = igtl::to_timestamp(std::chrono::seconds(5));
+  EXPECT_THAT(relative.take(model, at).found, SizeIs(1)) << "a recording that is played";
+}
+
+TEST(Inbox, AModelFollowsNoPoseThatIsOlderThanAllowed) {
+  const test_support::TemporaryFolder folder;
+  const auto registration = folder.path() / "T.txt";
+  std::ofstream(registration) << "1 0 0 0\n0 1 0 0\n0 0 1 0\n0 0 0 1\n";
+  Inbox inbox =
+      Inbox::open({.tumour_device = "F", .model_frame = "Stylus", .registration = registration})
+          .value();
+  inbox.take(inbox_message("StylusToReference", igtl::Transform{igtl::Matrix34f::Identity()}),
+             kInboxBegin);
+  const auto touched = inbox_message("F", points({{"F-1", Vec3(1, 2, 3)}}));
+  EXPECT_THAT(inbox.take(touched, kInboxBegin + milliseconds(900)).found, SizeIs(1));
+  const Taken late = inbox.take(touched, kInboxBegin + milliseconds(1100));
+  EXPECT_THAT(late.found, IsEmpty());
+  EXPECT_THAT(late.notes, ElementsAre(HasSubstr("StylusToReference was seen 1.1 s before it")));
+}
+
+// PlusServer and Slicer cut names at 20 bytes.
+TEST(Inbox, LongNamesAreKnownByTheirMetadataOrTheirBeginning) {
+  const std::string name = "UltrasoundTumourBoundaryNow";
+  Inbox inbox = Inbox::open({.tumour_device = name}).value();
+  auto cut = inbox_message(name.substr(0, 20), points({{"a", Vec3(1, 2, 3)}}));
+  EXPECT_THAT(inbox.take(cut, kInboxBegin).found, SizeIs(1)) << "version 1";
+  cut.envelope.metadata = {{"IGTL_DEVICE_NAME", name}};
+  EXPECT_THAT(inbox.take(cut, kInboxBegin).found, SizeIs(1));
+  cut.envelope.metadata = {{"IGTL_DEVICE_NAME", "UltrasoundTumourBoundaryThen"}};
+  EXPECT_THAT(inbox.take(cut, kInboxBegin).found, IsEmpty());
+}
+
 TEST(Inbox, KeepsNoMoreThanItUses) {
   const Inbox none = Inbox::open({}).value();
   EXPECT_FALSE(none.from_peers().is_wanted("POLYDATA"));
@@ -139,6 +196,7 @@ class InboxSweep : public testing::Test {
     options.device = folder.path() / "device.xml";
     std::ofstream(options.device) << sweep.device_text();
     options.registration = folder.path() / "T.txt";
+    options.wall_at = inbox_wall;
     std::ofstream(options.registration)
         << test_support::matrix_text(sweep.T_ras_reference().matrix());
   }
@@ -146,18 +204,22 @@ class InboxSweep : public testing::Test {
     options.contours = folder.path() / "contours.csv";
     std::ofstream stream(options.contours);
     stream.precision(12);
+    stream << "time_s,u_px,v_px\n";
     for (int frame = 0; frame < sweep.frames; ++frame) {
       const auto contour = sweep.section(frame, 90);
       for (Eigen::Index i = 0; i < contour.points_px.cols(); ++i) {
-        stream << frame << ',' << contour.points_px(0, i) << ',' << contour.points_px(1, i) << '\n';
+        stream << time_s(frame) << ',' << contour.points_px(0, i) << ',' << contour.points_px(1, i)
+               << '\n';
       }
     }
   }
+  static double time_s(int frame) { return 5.0 + 0.1 * frame; }
   void write_seed() {
     options.seeds = folder.path() / "seeds.csv";
     const int middle = sweep.frames / 2;
     const Eigen::Vector2d centre = sweep.section(middle).points_px.rowwise().mean();
-    std::ofstream(options.seeds) << middle << ',' << centre[0] << ',' << centre[1] << '\n';
+    std::ofstream(options.seeds) << "time_s,u_px,v_px\n"
+                                 << time_s(middle) << ',' << centre[0] << ',' << centre[1] << '\n';
   }
   static igtl::Matrix34f matrix_of(const std::string& numbers) {
     Eigen::Matrix4d matrix;
@@ -167,7 +229,8 @@ class InboxSweep : public testing::Test {
     return matrix.topRows<3>().cast<float>();
   }
   // The messages of all frames; the last one's time.
-  Inbox::TimePoint play(Inbox& inbox) {
+  // left_out: frames whose image does not come.
+  Inbox::TimePoint play(Inbox& inbox, const std::set<int>& left_out = {}) {
     const auto content = sweep.content();
     const std::size_t bytes = static_cast<std::size_t>(sweep.width * sweep.height);
     Inbox::TimePoint now = kInboxBegin;
@@ -185,7 +248,9 @@ class InboxSweep : public testing::Test {
       const auto* pixels =
           reinterpret_cast<const std::uint8_t*>(content.pixels.data()) + frame * bytes;
       image.voxels = std::vector<std::uint8_t>(pixels, pixels + bytes);
-      send(inbox_message("Image_Reference", image));
+      if (!left_out.contains(static_cast<int>(frame))) {
+        send(inbox_message("Image_Reference", image));
+      }
       for (const auto& [name, value] : content.frames[frame]) {
         constexpr std::string_view kEnd = "Transform";
         if (!name.ends_with(kEnd)) continue;
@@ -231,6 +296,29 @@ TEST_F(InboxSweep, TheNextSweepEndsTheOneBeforeAndCountsItsOwnImages) {
   EXPECT_THAT(taken.found, SizeIs(1));
 }
 
+// Images are skipped, or the bridge connects late: no contour comes to lie on another image.
+TEST_F(InboxSweep, AContourWithoutItsImageIsLeftOutAndNoOtherMoves) {
+  write_contours();
+  for (std::uint32_t seed = 0; seed < 40; ++seed) {
+    std::mt19937 random(seed);
+    const auto begin = static_cast<int>(random() % 8);
+    std::set<int> lost;
+    for (int frame = 0; frame < sweep.frames; ++frame) {
+      if (frame < begin || random() % 5 == 0) lost.insert(frame);
+    }
+    Inbox inbox = Inbox::open(options).value();
+    const auto last = play(inbox, lost);
+    const Taken taken = inbox.tick(last + milliseconds(2100));
+    ASSERT_THAT(taken.found, SizeIs(1)) << testing::PrintToString(taken.notes);
+    const Points& boundary = std::get<TumourBoundary>(taken.found[0].body).points;
+    for (Eigen::Index i = 0; i < boundary.cols(); ++i) {
+      EXPECT_LT(std::abs(sweep.distance_mm(boundary.col(i))), 0.02);
+    }
+    EXPECT_THAT(taken.found[0].told,
+                HasSubstr(fmt::format("sweep of {} images", sweep.frames - lost.size())));
+  }
+}
+
 TEST_F(InboxSweep, ASeedIsTraced) {
   sweep.speckle = 0.1;
   write_seed();
@@ -249,12 +337,16 @@ TEST_F(InboxSweep, ASeedIsTraced) {
 
 TEST_F(InboxSweep, ASweepThatGivesNothingSaysWhy) {
   write_contours();
-  std::ofstream(options.contours) << "999,1,1\n999,2,1\n999,2,2\n";
+  std::ofstream(options.contours) << "time_s,u_px,v_px\n999,1,1\n999,2,1\n999,2,2\n";
   Inbox inbox = Inbox::open(options).value();
   const auto last = play(inbox);
   const Taken taken = inbox.tick(last + milliseconds(2100));
   EXPECT_THAT(taken.found, IsEmpty());
-  EXPECT_THAT(taken.notes, Contains(HasSubstr("1 contours are of images that the sweep of 21")));
+  EXPECT_THAT(taken.notes, Contains(HasSubstr("none of 1 is of an image of this sweep")));
+  std::ofstream(options.contours) << "frame,u_px,v_px\n9,1,1\n9,2,1\n9,2,2\n";
+  play(inbox);
+  EXPECT_THAT(inbox.tick(kInboxBegin + std::chrono::seconds(30)).notes,
+              Contains(HasSubstr("frames cannot be counted in a live stream")));
   std::filesystem::remove(options.contours);
   play(inbox);
   EXPECT_THAT(inbox.tick(kInboxBegin + std::chrono::seconds(60)).notes,
@@ -290,6 +382,24 @@ TEST(InboundWorker, ABoundaryFarFromTheTumourIsRefused) {
   EXPECT_THAT(refusal_of(far, ErrorCode::kInvalidArgument),
               HasSubstr("160 mm from the tumour of case toy"));
   EXPECT_TRUE(observation_of(boundary_at(Vec3(-69, 30, 40)), kFollowed, 1));
+}
+
+// The daemon was started again with another patient.
+TEST(InboundWorker, WhatComesInIsOfTheFirstCaseAlone) {
+  for (const char* named : {"", "toy"}) {
+    std::promise<std::string> told;
+    InboundWorker worker(
+        Inbox::open({.tumour_device = "F"}).value(), "tcp://127.0.0.1:1", {},
+        [&](const std::string& line) { told.set_value(line); }, named);
+    worker.follow(kFollowed);
+    worker.follow({"other", Vec3(30, 30, 40), {8, 1, "other model"}});
+    auto message = inbox_message("F", points({{"a", Vec3(30, 30, 40)}}));
+    worker.post(std::move(message));
+    const std::jthread thread([&](const std::stop_token& stop) { worker.run(stop); });
+    EXPECT_THAT(told.get_future().get(),
+                HasSubstr("not accepted: the daemon serves case other (model other model), what "
+                          "comes in is of case toy (model model)"));
+  }
 }
 
 TEST(InboundWorker, WithoutASessionItSaysSo) {

@@ -25,6 +25,8 @@ ShownState current() {
   state.flags = "data_outside_region+deadline";
   state.currency = Currency::kCurrent;
   state.age_ms = 81.7;
+  state.method = "condensed";
+  state.boundary = "contact";
   state.blank = false;
   state.has_sd = true;
   state.has_known = true;
@@ -46,6 +48,9 @@ TEST(ShownState, JsonHasEveryKey) {
                           {"reason", ""},
                           {"age_ms", 82.0},
                           {"direction", "modeling"},
+                          {"recorded", false},
+                          {"method", "condensed"},
+                          {"boundary", "contact"},
                           {"blank", false},
                           {"has_sd", true},
                           {"has_known", true},
@@ -87,8 +92,8 @@ TEST(ShownState, BytesThatAreNoTextAreReplaced) {
 
 TEST(ShownState, TheStatusIsOkForACurrentUsableFieldAlone) {
   EXPECT_EQ(to_status(current()).code, igtl::kStatusOk);
-  for (const Currency currency :
-       {Currency::kNone, Currency::kSuperseded, Currency::kDegraded, Currency::kStale}) {
+  for (const Currency currency : {Currency::kNone, Currency::kSuperseded, Currency::kDegraded,
+                                  Currency::kStale, Currency::kAged, Currency::kExpired}) {
     ShownState state = current();
     state.currency = currency;
     state.reason = "no word";
@@ -96,6 +101,10 @@ TEST(ShownState, TheStatusIsOkForACurrentUsableFieldAlone) {
     EXPECT_EQ(to_status(state).text, "no word");
     EXPECT_TRUE(igtl::validate(to_status(state)));
   }
+  ShownState recorded = current();
+  recorded.recorded = true;
+  EXPECT_EQ(to_status(recorded).code, igtl::kStatusNotReady);
+  EXPECT_EQ(to_status(recorded).text, "RECORDED, not the patient now");
   ShownState blank = current();
   blank.blank = true;
   EXPECT_EQ(to_status(blank).code, igtl::kStatusNotReady);
@@ -122,6 +131,8 @@ ShownLine line() {
   line.state.quality = "good";
   line.state.currency = Currency::kCurrent;
   line.state.age_ms = 80.0;
+  line.state.method = "condensed";
+  line.state.boundary = "fixed";
   line.state.spacing_mm = 2.0;
   line.state.grid_error_mm = 0.114;
   line.dims = {62, 58, 60};
@@ -133,13 +144,18 @@ ShownLine line() {
 TEST(BridgeLine, TellsWhatIsShownAndToHowMany) {
   ShownLine told = line();
   EXPECT_EQ(shown_line(told, false),
-            "update 12  age 0.08 s  good, current  62 x 58 x 60 voxels, 2 mm, error 0.11 mm  4.2 ms"
-            "  1 client");
+            "update 12  age 0.08 s  condensed, fixed, good, current  62 x 58 x 60 voxels, 2 mm, "
+            "error 0.11 mm  4.2 ms  1 client");
+  told.state.recorded = true;
+  EXPECT_THAT(shown_line(told, false),
+              testing::HasSubstr("  RECORDED, condensed, fixed, good, current  "));
+  told.state.recorded = false;
   told.clients = 3;
   told.replaced = 7;
   told.state.age_ms = std::numeric_limits<double>::quiet_NaN();
   EXPECT_EQ(shown_line(told, false),
-            "update 12  age unknown  good, current  62 x 58 x 60 voxels, 2 mm, error 0.11 mm  4.2 "
+            "update 12  age unknown  condensed, fixed, good, current  62 x 58 x 60 voxels, 2 mm, "
+            "error 0.11 mm  4.2 "
             "ms  3 clients, 7 replaced");
 }
 

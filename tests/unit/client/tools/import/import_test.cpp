@@ -323,6 +323,8 @@ TEST_F(Import, NamesWhatIsMissing) {
   EXPECT_THAT(with([](O& o) { o.model = o.device; }), HasSubstr("device.xml"));
   options.contours = write("beyond.csv", "21,1,1\n21,2,1\n21,2,2\n");
   EXPECT_THAT(refusal(), HasSubstr("contour on frame 21: the recording has frames 0 to 20"));
+  options.contours = write("timed.csv", "time_s,u_px,v_px\n10.5,1,1\n10.5,2,1\n10.5,2,2\n");
+  EXPECT_THAT(refusal(), HasSubstr("time_s names live images"));
   options.contours = write("outside.csv", "10,1,1\n10,180,1\n10,1,3\n");
   EXPECT_THAT(
       refusal(),

@@ -74,7 +74,13 @@ TEST(Page, AJournalWithoutASessionHasNothingToRecord) {
 // Each stands in words: nothing depends on colour.
 TEST(Page, WhatNeedsAttentionStandsInCapitalsAndAlarms) {
   const std::pair<const char*, std::function<void(DaemonReport&)>> kFaults[] = {
-      {"STALE", [](DaemonReport& report) { report.session.age_ms = 600'001.0; }},
+      {", AGED", [](DaemonReport& report) { report.session.age_ms = 30'001.0; }},
+      {", EXPIRED", [](DaemonReport& report) { report.session.age_ms = 600'001.0; }},
+      {"ATTENTION: the field is aged: its data are 30.1 s old: 30 s at most",
+       [](DaemonReport& report) { report.session.age_ms = 30'100.0; }},
+      {"RECORDED, well", [](DaemonReport& report) { report.session.recorded = true; }},
+      {"session 3, owner 00ab12cd34, RECORDED, condensed, contact",
+       [](DaemonReport& report) { report.session.recorded = true; }},
       {"NOT RECORDING: disk full",
        [](DaemonReport& report) {
          report.journal->recording = false;
@@ -155,7 +161,8 @@ TEST(Summary, IsOneLineWithPhaseAgeRateLatencyAndJournal) {
   now.uptime_ms += 1000;
   now.usable += 30;
   EXPECT_EQ(summary({now, before}),
-            "tracking, field 0.2 s old, 30.0 updates/s, total p50 31.50 p95 40.25 p99 55.00 max "
+            "tracking, field 0.2 s old, condensed, contact, 30.0 updates/s, total p50 31.50 p95 "
+            "40.25 p99 55.00 max "
             "90.12 ms, recording");
 }
 

@@ -18,6 +18,10 @@ inline wire::DaemonReport sample_report() {
   report.session.phase = SessionPhase::kTracking;
   report.session.newest_update = report.session.newest_usable = 812;
   report.session.age_ms = 240.0;
+  report.session.aged_after_ms = 30'000;
+  report.session.expired_after_ms = 600'000;
+  report.session.method = "condensed";
+  report.session.boundary = "contact";
   report.owner = "00ab12cd34";
   report.max_age_s = 600.0;
   report.limit_ms = 13'000.0;

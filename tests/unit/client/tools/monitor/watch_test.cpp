@@ -85,14 +85,18 @@ TEST(Watch, ALineTellsWhatTravelledAndWhetherItIsCurrent) {
   message.received_nodes = 2;
   WatchedUpdate told = watched(message, {20}, 100);
   told.status = {Currency::kCurrent, "", 0.08};
-  EXPECT_EQ(
-      watch_line(told, false),
-      "update 12  age 0.08 s  3 of 100 nodes (2 sent, 7.1 kB)  tumour 0.00 mm  good, current");
+  EXPECT_EQ(watch_line(told, false),
+            "update 12  age 0.08 s  3 of 100 nodes (2 sent, 7.1 kB)  tumour 0.00 mm  "
+            "condensed, contact, good, current");
   told.status = {Currency::kStale, "no word", std::nan("")};
   told.tumour_mm.reset();
   EXPECT_EQ(watch_line(told, false),
-            "update 12  age unknown  3 of 100 nodes (2 sent, 7.1 kB)  no tumour node  good, stale: "
-            "no word");
+            "update 12  age unknown  3 of 100 nodes (2 sent, 7.1 kB)  no tumour node  "
+            "condensed, contact, good, stale: no word");
+  told.status = {Currency::kAged, "35 s old", 35.0, true};
+  EXPECT_THAT(watch_line(told, false), EndsWith("good, aged, RECORDED: 35 s old"));
+  EXPECT_EQ(nlohmann::json::parse(watch_line(told, true)).at("recorded"), true);
+  told.status = {Currency::kStale, "no word", std::nan("")};
   const auto said = nlohmann::json::parse(watch_line(told, true));
   EXPECT_EQ(said.at("sequence"), 12);
   EXPECT_EQ(said.at("currency"), "stale");
@@ -140,7 +144,7 @@ TEST(Watch, SubscribesWithTheChoiceAndEndsAfterItsCount) {
     state.phase = SessionPhase::kTracking;
     state.newest_update = state.newest_usable = 1;
     state.age_ms = 250.0;
-    state.valid_ms = 60000;
+    state.valid_ms = SessionState::kMaxValidity_ms;
     FakeDaemon::Answers answers = {
         wire::encode_frame(MessageType::kSessionState, id, wire::encode(state))};
     if (subscriptions.size() == 1) {
