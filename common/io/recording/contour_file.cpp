@@ -3,13 +3,16 @@
 
 #include <fmt/format.h>
 
+#include <array>
 #include <cmath>
 #include <limits>
 #include <nlohmann/json.hpp>
+#include <optional>
 #include <set>
 
 #include "common/io/files/csv_numbers.hpp"
 #include "common/io/files/file_access.hpp"
+#include "common/io/files/table.hpp"
 
 namespace brainshift::io {
 namespace {
@@ -33,14 +36,32 @@ struct Row {
   }
 };
 
-bool parse_row(std::string_view text, bool timed, Row& row) {
-  const auto cells = cells_of(text);
-  double frame = 0.0;
-  if (cells.size() != 3 || !parse_number(cells[0], frame) ||
-      !parse_number(cells[1], row.at_px.x()) || !parse_number(cells[2], row.at_px.y())) {
-    return false;
+using RowColumns = std::array<std::size_t, 3>;  // frame or time, u, v
+
+struct RowForm {
+  RowColumns columns = {0, 1, 2};
+  bool timed = false;  // images are named by their time
+};
+
+std::optional<RowForm> row_form(const Heading& heading) {
+  const Heading::Words pixels = {"px", "pixel", "pixels"};
+  auto image = heading.column({"frame", "image"}, {"number", "index"});
+  const auto time = heading.column({"time"}, {"s"});
+  const auto u = heading.column({"u", "x"}, pixels), v = heading.column({"v", "y"}, pixels);
+  if (image.has_value() == time.has_value() || !u || !v) return std::nullopt;
+  return RowForm{{image ? *image : *time, *u, *v}, time.has_value()};
+}
+
+bool parse_row(const Cells& cells, const RowForm& form, Row& row) {
+  double numbers[3];
+  for (std::size_t i = 0; i < 3; ++i) {
+    if (form.columns[i] >= cells.size() || !parse_number(cells[form.columns[i]], numbers[i])) {
+      return false;
+    }
   }
-  if (timed) {
+  row.at_px = {numbers[1], numbers[2]};
+  const double frame = numbers[0];
+  if (form.timed) {
     row.time_s = frame;
     return frame > 0.0;
   }
@@ -50,20 +71,22 @@ bool parse_row(std::string_view text, bool timed, Row& row) {
 }
 
 Result<std::vector<Row>> read_rows(const std::string& content) {
+  const Table table = parse_table(content, true);
+  std::optional<RowForm> form = RowForm{};
+  if (table.heading) form = row_form(*table.heading);
+  if (!form) {
+    return bad_line(table.heading_row.line, table.heading_row.text,
+                    "must name the columns frame (or time_s), u_px and v_px, each once");
+  }
   std::vector<Row> rows;
-  bool heading_allowed = true, timed = false;
-  for (const auto& [line, text] : content_lines(content)) {
-    const std::string_view cells = trimmed(std::string_view(text).substr(0, text.find('#')));
+  for (const TableRow& cells : table.rows) {
     Row row;
-    row.line = line;
-    timed = timed || (heading_allowed && cells == "time_s,u_px,v_px");
-    const bool heading = heading_allowed && (timed || cells == "frame,u_px,v_px");
-    heading_allowed = false;
-    if (heading) continue;
-    if (!parse_row(cells, timed, row)) {
-      return bad_line(line, cells,
-                      timed ? "must be time_s,u_px,v_px with a time since 1970"
-                            : "must be frame,u_px,v_px with a frame from 0");
+    row.line = cells.line;
+    const std::size_t size = table.heading ? table.heading->size() : 3;
+    if (cells.cells.size() != size || !parse_row(cells.cells, *form, row)) {
+      return bad_line(cells.line, cells.text,
+                      form->timed ? "must be time_s,u_px,v_px with a time since 1970"
+                                  : "must be frame,u_px,v_px with a frame from 0");
     }
     rows.push_back(row);
   }
@@ -157,8 +180,8 @@ Result<std::vector<ultrasound::Contour>> contours_of_json(const std::string& con
 Result<std::vector<ultrasound::Contour>> read_contours(const fs::path& path, bool closed) {
   using Contours = std::vector<ultrasound::Contour>;
   return parse_file(path, [&](const std::string& content) -> Result<Contours> {
-    if (path.extension() == ".json") return contours_of_json(content);
-    if (path.extension() != ".csv") return unreadable("contours must be a .csv or .json file");
+    if (lower_extension(path) == ".json") return contours_of_json(content);
+    if (lower_extension(path) != ".csv") return unreadable("contours must be a .csv or .json file");
     return read_rows(content).and_then(
         [&](const std::vector<Row>& rows) { return contours_of_rows(rows, closed); });
   });
