@@ -8,6 +8,8 @@
 
 #include "common/values/estimate.hpp"
 
+#include "common/linalg/growing_matrix.hpp"
+
 namespace brainshift::inversion {
 namespace {
 
@@ -76,8 +78,8 @@ ModePosterior::ModePosterior(ModeWindow window) : window_(window) {
 
 void ModePosterior::reserve(int data) {
   if (3 * data <= jacobian_.rows()) return;
-  jacobian_.resize(3 * data, SparseData::kMaxCommonErrors + window_.count + 1);
-  residual_.resize(3 * data);
+  linalg::replace(residual_, 3 * data);
+  linalg::replace(jacobian_, 3 * data, SparseData::kMaxCommonErrors + window_.count + 1);
 }
 
 void ModePosterior::linearise(SampledOperators& sampled, const ContactReduction& reduction,

@@ -7,14 +7,17 @@
 #include <numeric>
 
 #include "common/inversion/contract/data_check.hpp"
+#include "common/linalg/growing_matrix.hpp"
 
 namespace brainshift::inversion {
 
 void RobustWeights::reserve(int data) {
   sorted_.reserve(static_cast<std::size_t>(data));
-  weights_.conservativeResize(data);  // those that data which move have so far
-  next_.resize(data);
-  residuals_.resize(data);
+  linalg::replace(next_, data);
+  linalg::replace(residuals_, data);
+  VecX grown(data);  // data that move keep theirs
+  grown.head(weights_.size()) = weights_;
+  weights_.swap(grown);
 }
 
 void RobustWeights::reset(int data) {

@@ -9,6 +9,7 @@
 #include <sstream>
 
 #include "common/inversion/contract/data_check.hpp"
+#include "common/linalg/growing_matrix.hpp"
 #include "common/operators/encode_columns.hpp"
 
 namespace brainshift::inversion {
@@ -29,23 +30,25 @@ SampledOperators::SampledOperators(std::shared_ptr<const CondensedOperators> ope
 
 void SampledOperators::reserve(int data) {
   if (data <= capacity_) return;
-  capacity_ = data;
-  rows_.resize(4, data);
-  barycentric_.resize(4, data);
-  weights_.resize(4, data);
-  directions_.resize(3, data);
-  first_row_.resize(static_cast<std::size_t>(data) + 1);
-  left_out_.resize(kRemainders, data);
-  sd_.resize(data);
-  free_body_.resize(3 * data, SparseData::kMaxCommonErrors + window_.count + 1);
-  before_.resize(3 * data, window_.first);
-  row_weights_.resize(3 * data);
-  forced_.resize(3 * data);
   const auto slaves = static_cast<std::size_t>(operators_->num_slaves());
   const std::size_t contact = 3 * static_cast<std::size_t>(data) * slaves;
-  contact_columns_.reset(new double[contact]);  // uninitialised: memory is used as it is touched
-  whitened_contact_.reset(new double[contact]);
+  // Uninitialised: memory is used as it is touched.
+  std::unique_ptr<double[]> columns(new double[contact]), whitened(new double[contact]);
+  linalg::replace(rows_, 4, data);
+  linalg::replace(barycentric_, 4, data);
+  linalg::replace(weights_, 4, data);
+  linalg::replace(directions_, 3, data);
+  first_row_.resize(static_cast<std::size_t>(data) + 1);
+  linalg::replace(left_out_, kRemainders, data);
+  linalg::replace(sd_, data);
+  linalg::replace(free_body_, 3 * data, SparseData::kMaxCommonErrors + window_.count + 1);
+  linalg::replace(before_, 3 * data, window_.first);
+  linalg::replace(row_weights_, 3 * data);
+  linalg::replace(forced_, 3 * data);
   missing_.reserve(slaves);
+  contact_columns_ = std::move(columns);
+  whitened_contact_ = std::move(whitened);
+  capacity_ = data;  // all of it is there
 }
 
 Status SampledOperators::refuse(const SparseData& data, int datum, const std::string& where) {

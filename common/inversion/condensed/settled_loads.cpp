@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "common/inversion/contract/data_check.hpp"
+#include "common/linalg/growing_matrix.hpp"
 
 namespace brainshift::inversion {
 namespace {
@@ -62,7 +63,7 @@ void SettledLoads::reserve(int data) {
   descent_.reserve(data);
   sampled_.reserve(data);
   weights_.reserve(data);
-  norms_.resize(data);
+  linalg::replace(norms_, data);
 }
 
 Status SettledLoads::take(const SparseData& data) {

@@ -106,6 +106,7 @@ bool finite(const PriorScaleValues& values) {
 bool all_finite(const Estimate& estimate) {
   const ContactSummary& contact = estimate.contact;
   return estimate.displacement.allFinite() && estimate.sd_mm.allFinite() &&
+         estimate.known.allFinite() && finite_or_absent(estimate.region_known) &&
          estimate.contact_force_n.allFinite() && std::isfinite(contact.max_penetration_mm) &&
          finite_or_absent(contact.decrement) && finite_or_absent(contact.max_violation_mm) &&
          finite(estimate.initial_misfit_mm) && finite(estimate.misfit_mm) &&

@@ -522,7 +522,7 @@ TEST_F(RunningSession, AgeCountsFromAcquisitionAndWhileTheComputerSleeps) {
   late.acquired_ns = 2'000'000'000;
   late.sent_ns = late.acquired_ns + 100'000'000'000;
   now_ += 101s;
-  ASSERT_TRUE(session_.submit(late, now_, 5s).has_value());
+  ASSERT_TRUE(session_.submit(late, now_, {}, 5s).has_value());
   act();
   answer();
   now_ += 3s;
