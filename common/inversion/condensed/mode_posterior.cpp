@@ -6,9 +6,8 @@
 #include <algorithm>
 #include <cmath>
 
-#include "common/values/estimate.hpp"
-
 #include "common/linalg/growing_matrix.hpp"
+#include "common/values/estimate.hpp"
 
 namespace brainshift::inversion {
 namespace {
