@@ -159,6 +159,7 @@ Result<SkullFit> fit_of_skull(const TriangleSurface& skull, const BrainSurface& 
 Result<TriangleSurface> checked_skull(TriangleSurface skull, const BrainSurface& brain,
                                       const std::vector<NodeIndex>& slaves, const std::string& what,
                                       Notes* notes) {
+  if (Status whole = check_surface(skull, what); !whole) return tl::unexpected(whole.error());
   const Vec3 size = skull.vertices.rowwise().maxCoeff() - skull.vertices.rowwise().minCoeff();
   const Status extent = check_extent(size, what + ": skull", kSmallestSkull_mm, kLargestSkull_mm);
   if (!extent) return tl::unexpected(extent.error());

@@ -22,7 +22,7 @@ constexpr double kMm3PerCc = 1000.0;
 // Rounding of a scaled label.
 constexpr float kWholeNumber = 1e-3F;
 // A label map has fewer different values, an interpolated mask more.
-constexpr std::size_t kFewValues = 32;
+constexpr std::size_t kFewValues = 16;
 constexpr double kTop = 0.9, kLeastTop = 1.0 / 3.0;
 constexpr double kLargestRipple = 0.05;
 constexpr double kLargestLostPart = 0.1;
@@ -141,11 +141,9 @@ Result<VoxelImage> brain_mask(const VoxelImage& image, const std::string& what, 
         "{}: falls into {} parts that do not touch, of {:.1f} and {:.1f} cc and so on: must be one",
         what, parts.voxels.size(), first, second));
   }
-  add_note(
-      notes,
-      fmt::format("{}: {} small parts beside the brain of {:.1f} cc, {:.2f} cc in all, are left "
-                  "out",
-                  what, parts.voxels.size() - 1, first, static_cast<double>(lost) * to_cc));
+  add_note(notes,
+           fmt::format("{}: parts beside the brain of {:.1f} cc are left out: {}, {:.2f} cc in all",
+                       what, first, parts.voxels.size() - 1, static_cast<double>(lost) * to_cc));
   return largest;
 }
 
@@ -299,39 +297,40 @@ Result<std::vector<Focus>> tumour_foci(const VoxelImage& image, const std::vecto
     add_note(notes, fmt::format("{}: the tumour has {} parts: {}", what, foci.size(), told));
   }
   if (specks > 0) {
-    add_note(notes,
-             fmt::format("{}: {} specks, {:.3f} cc in all, are left out; parts from {:g} cc "
-                         "on count",
-                         what, specks, speck_mm3 / kMm3PerCc, kSmallestFocus_mm3 / kMm3PerCc));
+    add_note(notes, fmt::format("{}: specks below {:g} cc are left out: {}, {:.3f} cc in all", what,
+                                kSmallestFocus_mm3 / kMm3PerCc, specks, speck_mm3 / kMm3PerCc));
   }
   return foci;
 }
 
+Status check_surface(const TriangleSurface& surface, const std::string& what) {
+  if (surface.num_triangles() == 0) return fail(ErrorCode::kEmptySet, what + ": has no triangle");
+  if (!surface.vertices.allFinite()) {
+    return fail(ErrorCode::kNotFinite, what + ": has a vertex that is not finite");
+  }
+  if (surface.triangles.minCoeff() >= 0 && surface.triangles.maxCoeff() < surface.num_vertices()) {
+    return {};
+  }
+  return invalid(what + ": a triangle names a vertex that does not exist");
+}
+
 Result<TriangleSurface> closed_surface(const TriangleSurface& surface, const std::string& what,
                                        Notes* notes) {
-  const auto refuse = [&what](ErrorCode code, const std::string& reason) {
-    return fail(code, fmt::format("{}: {}", what, reason));
+  if (Status whole = check_surface(surface, what); !whole) return tl::unexpected(whole.error());
+  const auto refuse = [&what](const std::string& reason) {
+    return invalid(fmt::format("{}: must be a closed surface: {}", what, reason));
   };
-  if (surface.num_triangles() == 0) return refuse(ErrorCode::kEmptySet, "has no triangle");
-  if (!surface.vertices.allFinite())
-    return refuse(ErrorCode::kNotFinite, "has a vertex that is not finite");
-  if (surface.triangles.minCoeff() < 0 || surface.triangles.maxCoeff() >= surface.num_vertices())
-    return refuse(ErrorCode::kInvalidArgument, "a triangle names a vertex that does not exist");
   TriangleSurface closed = surface;
   if (!geometry::is_closed(surface)) {
     auto mended = geometry::mend_surface(surface, kCrack_mm);
     const auto rims = geometry::surface_rims(mended.surface);
     if (!rims) {
-      return refuse(ErrorCode::kInvalidArgument,
-                    "must be a closed surface: " + rims.error().message);
+      return refuse(rims.error().message);
     }
     if (!rims->rim_mm.empty()) {
-      return refuse(
-          ErrorCode::kInvalidArgument,
-          fmt::format("must be a closed surface: it has {} open edges round {} holes, the "
-                      "longest rim {:.3g} mm",
-                      rims->open_edges, rims->rim_mm.size(),
-                      *std::max_element(rims->rim_mm.begin(), rims->rim_mm.end())));
+      return refuse(fmt::format("it has {} open edges round {} holes, the longest rim {:.3g} mm",
+                                rims->open_edges, rims->rim_mm.size(),
+                                *std::max_element(rims->rim_mm.begin(), rims->rim_mm.end())));
     }
     add_note(notes,
              fmt::format("{}: was closed: {} vertices within {:g} mm of another were merged, "

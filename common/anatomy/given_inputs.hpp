@@ -52,9 +52,13 @@ Result<std::vector<Focus>> tumour_foci(const VoxelImage& image, const std::vecto
 // them.
 std::string listed_labels(const VoxelImage& image);
 
+// kEmptySet, kNotFinite, kInvalidArgument: it has no triangle, a vertex that is not finite, a
+// triangle that names a vertex that does not exist.
+Status check_surface(const TriangleSurface& surface, const std::string& what);
+
 // A given surface, mended where it is not closed (geometry::mend_surface, 1 micrometre; noted) and
-// turned outwards. kEmptySet, kNotFinite, kInvalidArgument, kDegenerateMesh: it has no triangle, a
-// vertex that is not finite, open edges (counted), triangles turned against each other.
+// turned outwards. Errors of check_surface; kInvalidArgument: open edges (counted), triangles that
+// are turned against each other, edges of more than two.
 Result<TriangleSurface> closed_surface(const TriangleSurface& surface, const std::string& what,
                                        Notes* notes);
 

@@ -2,6 +2,12 @@
 #include "common/geometry/misplacement.hpp"
 
 namespace brainshift::geometry {
+namespace {
+
+// What is measured of a head.
+constexpr double kSmallest_mm = 3.0, kLargest_mm = 500.0;
+
+}  // namespace
 
 std::string likely_mistake(const Points& points, const std::function<bool(const Points&)>& fits) {
   struct Mistake {
@@ -17,7 +23,11 @@ std::string likely_mistake(const Points& points, const std::function<bool(const 
       {"with left and right exchanged", Vec3(-1, 1, 1)}};
   if (points.cols() == 0 || !points.allFinite()) return {};
   for (const Mistake& mistake : kMistakes) {
-    if (fits(mistake.factors.asDiagonal() * points)) return std::string("; ") + mistake.what + "?";
+    const Points meant = mistake.factors.asDiagonal() * points;
+    const double extent = (meant.rowwise().maxCoeff() - meant.rowwise().minCoeff()).maxCoeff();
+    // Nearly a point lies nearly anywhere.
+    if (extent < kSmallest_mm || extent > kLargest_mm) continue;
+    if (fits(meant)) return std::string("; ") + mistake.what + "?";
   }
   return {};
 }

@@ -11,8 +11,8 @@
 namespace brainshift::geometry {
 
 // The end of a sentence about points that do not fit: "; in LPS instead of RAS?", "; in metres
-// instead of millimetres?" and so on: the first after which fits(points in mm RAS) holds; "" where
-// none does.
+// instead of millimetres?" and so on: the first after which the points spread over 3 to 500 mm
+// and fits(points in mm RAS) holds; "" where there is none.
 std::string likely_mistake(const Points& points, const std::function<bool(const Points&)>& fits);
 
 }  // namespace brainshift::geometry

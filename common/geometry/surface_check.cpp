@@ -256,7 +256,9 @@ Result<CheckedSurface> check_cortical_surface(TriangleSurface surface, const Cor
   checked.distance_mm = (points.colwise() - site.centre).colwise().norm().minCoeff();
   if (checked.distance_mm > kFarthest_mm) {
     const std::string mistake = likely_mistake(points, [&](const Points& meant) {
-      return (meant.colwise() - site.centre).colwise().norm().minCoeff() <= kFarthest_mm;
+      const double extent = (meant.rowwise().maxCoeff() - meant.rowwise().minCoeff()).norm();
+      return check_extent(extent, site) &&
+             (meant.colwise() - site.centre).colwise().norm().minCoeff() <= kFarthest_mm;
     });
     return invalid(fmt::format(
         "the surface's closest point is {:.1f} mm from the craniotomy's centre: must "

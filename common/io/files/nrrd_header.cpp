@@ -92,6 +92,8 @@ Result<NrrdHeader> parse_nrrd_header(std::string_view content) {
   std::string_view rest = content;
   if (!take_line(rest).starts_with("NRRD000")) return unreadable("is no NRRD file");
   while (true) {
+    // A detached header may end without an empty line.
+    if (rest.empty() && !header.field("data file").empty()) break;
     if (rest.empty() || content.size() - rest.size() > kLargestTextHeader) {
       return unreadable("its NRRD header has no end (an empty line)");
     }

@@ -360,7 +360,8 @@ Cells cells_below(std::string_view line, bool commas) {
 class XyzColumns {
  public:
   // Takes one line that is not empty: a heading, a comment or a point.
-  void take(std::string_view line, std::vector<double>& coordinates) {
+  void take(std::string_view whole, std::vector<double>& coordinates) {
+    std::string_view line = whole;
     line.remove_prefix(line.find_first_not_of(kBetween));
     const std::size_t words = line.find_first_not_of("#/ \t");
     if (line.front() == '#' || line.substr(0, 2) == "//") {
@@ -374,17 +375,17 @@ class XyzColumns {
                         line.substr(0, 3) != "nan" && line.substr(0, 3) != "inf";
     const bool first = std::exchange(first_, false);
     if (first && letter && !has_number(quoted_cells_of(line))) {
-      if (obey(line)) return;
+      if (obey(whole)) return;
       refuse_format(fmt::format("the heading \"{}\" must name columns x,y,z or r,a,s or l,p,s",
                                 trimmed(line).substr(0, 60)));
     }
     if (const bool commas = comment_.find(',') != std::string_view::npos;
-        first && cells_below(comment_, commas).size() == cells_below(line, commas).size()) {
+        first && cells_below(comment_, commas).size() == cells_below(whole, commas).size()) {
       obey(comment_);
     }
     const std::size_t number = coordinates.size() / 3;
     if (heading_) {
-      const Cells cells = cells_below(line, commas_);
+      const Cells cells = cells_below(whole, commas_);  // the first cell may be empty
       if (!value_of(heading_->placed(cells))) return;
       const auto point = columns_.of(cells);
       if (!point) {

@@ -114,8 +114,9 @@ TEST(Refusals, ALabelThatNoVoxelHas) {
   inputs.config.tumour = TumourLabel{"labels.nii", {4}};
   inputs.tumour_labels = geometry::balls::binary_balls(
       geometry::balls::empty_image(9, kBallCentre, Mat3::Identity()), {{kBallCentre, 3.0}});
-  expect_refused(inputs, ErrorCode::kEmptySet,
-                 {"tumour.label_volume.file = 'labels.nii'", "label = 4", "there are: 1 (0.1"});
+  expect_refused(
+      inputs, ErrorCode::kEmptySet,
+      {"tumour.label_volume.file = 'labels.nii'", "label = 4", "there are: 1 (0.09 cc)"});
 }
 
 TEST(Refusals, ALabelTooSmallForASurface) {

@@ -79,6 +79,8 @@ TEST(NrrdHeader, RefusesWhatItCannotStandFor) {
   EXPECT_THAT(bad("# a comment", "data file: other.raw"),
               HasSubstr("data file = other.raw: its pixels lie elsewhere"));
   EXPECT_THAT(bad("# a comment", "datafile: other.raw"), HasSubstr("detached header"));
+  EXPECT_THAT(refusal("NRRD0004\ndimension: 1\nsizes: 2\ndata file: a.raw\n"),
+              HasSubstr("data file = a.raw: its pixels lie elsewhere"));
   EXPECT_THAT(bad("# a comment", "byte skip: -1"), HasSubstr("byte skip = -1"));
   EXPECT_THAT(bad("# a comment", "type: float"), HasSubstr("field type is given twice"));
   EXPECT_THAT(bad("# a comment", "words alone"), HasSubstr("\"words alone\" has no value"));

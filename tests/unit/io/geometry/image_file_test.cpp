@@ -313,7 +313,8 @@ TEST_F(ImageFile, Nifti2IsRead) {
   for (std::size_t i = 0; i < 8; ++i) set(16 + 8 * i, dims[i]);
   for (std::size_t i = 0; i < 8; ++i) set(104 + 8 * i, 1.0);  // pixdim
   set(168, std::int64_t{544});                                // vox_offset
-  set(348, std::int32_t{1});                                  // sform_code
+  set(112, 2.0);
+  set(348, std::int32_t{1});  // sform_code
   const double rows[12] = {2, 0, 0, -90, 0, 1, 0, -125, 0, 0, 1, -71};
   for (std::size_t i = 0; i < 12; ++i) set(400 + 8 * i, rows[i]);
   set(500, std::int32_t{2});  // mm
