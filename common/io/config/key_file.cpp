@@ -51,7 +51,7 @@ Result<std::string> read_guarded(const fs::path& path, mode_t forbidden,
   if (static_cast<std::uintmax_t>(status.st_size) > kMaxFileBytes) {
     return invalid_file(path, "is too large for a file of keys");
   }
-  return read_file(path);
+  return read_text(path);
 }
 
 tl::unexpected<Error> line_error(const fs::path& path, int line, const std::string& message) {

@@ -18,6 +18,12 @@ std::string_view trimmed(std::string_view text) {
   return text.substr(first, text.find_last_not_of(" \t\r") - first + 1);
 }
 
+std::string lower_case(std::string_view text) {
+  std::string lower(text);
+  for (char& c : lower) c = static_cast<char>(c >= 'A' && c <= 'Z' ? c - 'A' + 'a' : c);
+  return lower;
+}
+
 std::vector<std::pair<int, std::string>> content_lines(const std::string& text) {
   std::vector<std::pair<int, std::string>> lines;
   std::istringstream in(text);
@@ -42,6 +48,7 @@ std::optional<std::string_view> assigned_value(std::string_view line, std::strin
 
 bool parse_number(std::string_view text, double& number) {
   text = trimmed(text);
+  if (text.size() > 1 && text[0] == '+' && text[1] != '-') text.remove_prefix(1);
   const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), number);
   return error == std::errc() && end == text.data() + text.size() && std::isfinite(number);
 }

@@ -14,6 +14,8 @@ namespace brainshift::io {
 
 // Without blanks at either end.
 std::string_view trimmed(std::string_view text);
+// A to Z as a to z; all else as it is.
+std::string lower_case(std::string_view text);
 // Every line that is neither empty nor a comment behind #, trimmed, with its number from 1.
 std::vector<std::pair<int, std::string>> content_lines(const std::string& text);
 // kUnreadable: "line 3: "the start of it" must be ...".

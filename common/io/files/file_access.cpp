@@ -5,7 +5,9 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <atomic>
+#include <cctype>
 #include <cerrno>
 #include <cstring>
 #include <fstream>
@@ -67,6 +69,30 @@ Result<std::string> read_file(const fs::path& path) {
     return unreadable(path, "cannot be read to its end");
   }
   return content;
+}
+
+Result<std::string> without_byte_order_mark(std::string content) {
+  if (content.starts_with("\xEF\xBB\xBF")) content.erase(0, 3);
+  const bool wide = content.starts_with("\xFF\xFE") || content.starts_with("\xFE\xFF");
+  if (wide && content.find('<') > 3) {
+    return unreadable("is text in UTF-16 (its byte-order mark says so): save it as UTF-8");
+  }
+  return content;
+}
+
+Result<std::string> read_text(const fs::path& path) {
+  Result<std::string> bytes = read_file(path);
+  if (!bytes) return bytes;
+  Result<std::string> content = without_byte_order_mark(std::move(*bytes));
+  if (!content) return file_error(path, content.error());
+  return content;
+}
+
+std::string lower_extension(const fs::path& path) {
+  std::string extension = path.extension().string();
+  std::transform(extension.begin(), extension.end(), extension.begin(),
+                 [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
+  return extension;
 }
 
 Status write_file(const fs::path& path, std::string_view content) {

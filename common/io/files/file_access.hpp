@@ -70,12 +70,21 @@ inline tl::unexpected<Error> unreadable(const std::filesystem::path& path,
   return file_error(ErrorCode::kUnreadable, path, message);
 }
 
-// What `parse` makes of the bytes of a regular file: a Result. Errors of read_file, and those of
-// `parse` with the path in front.
+// The one rule for byte-order marks: that of UTF-8 in front of a file's content is cut off.
+// kUnreadable for UTF-16, unless it is XML, which says so itself.
+Result<std::string> without_byte_order_mark(std::string content);
+// The content of a text file behind its byte-order mark. Errors of read_file, and the above.
+Result<std::string> read_text(const std::filesystem::path& path);
+
+// Of the name, in lower case, with its dot: programs write .NII and .STL too.
+std::string lower_extension(const std::filesystem::path& path);
+
+// What `parse` makes of a regular file's content behind its byte-order mark: a Result. Errors of
+// read_text, and those of `parse` with the path in front.
 template <typename Parse>
 auto parse_file(const std::filesystem::path& path, const Parse& parse)
     -> decltype(parse(std::string())) {
-  Result<std::string> content = read_file(path);
+  Result<std::string> content = read_text(path);
   if (!content) return tl::unexpected(content.error());
   auto parsed = parse(std::move(*content));
   if (!parsed) return file_error(path, parsed.error());

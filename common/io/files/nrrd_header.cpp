@@ -4,6 +4,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cctype>
 
 #include "common/io/files/csv_numbers.hpp"
 #include "common/io/files/file_access.hpp"
@@ -33,23 +34,26 @@ Status understand(NrrdHeader& header) {
     return unreadable(fmt::format("dimension = \"{}\" does not agree with the {} sizes \"{}\"",
                                   dimension, header.sizes.size(), text));
   }
+  for (const char* key : {"data file", "line skip", "byte skip"}) {
+    const std::string value = header.field(key);
+    if (!value.empty() && value != "0") {
+      return unreadable(
+          fmt::format("{} = {}: its pixels lie elsewhere (a detached header); must follow the "
+                      "header in the same file",
+                      key, value));
+    }
+  }
   header.element_type = element_type(header.field("type"));
-  const std::string encoding = header.field("encoding");
+  const std::string encoding = header.word("encoding");
   header.compressed = encoding == "gzip" || encoding == "gz";
   if (!header.compressed && encoding != "raw") {
     return unreadable("encoding = " + encoding + ": must be raw or gzip");
   }
-  const std::string endian = header.field("endian");
+  const std::string endian = header.word("endian");
   if (!endian.empty() && endian != "little" && endian != "big") {
     return unreadable("endian = " + endian + ": must be little or big");
   }
   header.big_endian = endian == "big";
-  for (const char* key : {"data file", "datafile", "line skip", "byte skip"}) {
-    const std::string value = header.field(key);
-    if (!value.empty() && value != "0") {
-      return unreadable(fmt::format("{} = {}: pixels must follow the header", key, value));
-    }
-  }
   return {};
 }
 
@@ -62,16 +66,34 @@ std::string_view take_line(std::string_view& rest) {
   return line;
 }
 
+bool BeforeByLetters::operator()(std::string_view a, std::string_view b) const {
+  const auto next = [](std::string_view& name) {
+    name.remove_prefix(std::min(name.find_first_not_of(" \t"), name.size()));
+    if (name.empty()) return -1;
+    const int letter = std::tolower(static_cast<unsigned char>(name.front()));
+    name.remove_prefix(1);
+    return letter;
+  };
+  while (true) {
+    const int one = next(a), other = next(b);
+    if (one != other || one < 0) return one < other;
+  }
+}
+
 std::string NrrdHeader::field(const std::string& name) const {
   const auto found = fields.find(name);
   return found == fields.end() ? std::string() : found->second;
 }
+
+std::string NrrdHeader::word(const std::string& name) const { return lower_case(field(name)); }
 
 Result<NrrdHeader> parse_nrrd_header(std::string_view content) {
   NrrdHeader header;
   std::string_view rest = content;
   if (!take_line(rest).starts_with("NRRD000")) return unreadable("is no NRRD file");
   while (true) {
+    // A detached header may end without an empty line.
+    if (rest.empty() && !header.field("data file").empty()) break;
     if (rest.empty() || content.size() - rest.size() > kLargestTextHeader) {
       return unreadable("its NRRD header has no end (an empty line)");
     }

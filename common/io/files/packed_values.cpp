@@ -72,21 +72,22 @@ Result<std::string> inflate_all(std::string_view compressed, std::size_t size) {
 }  // namespace
 
 std::string element_type(const std::string& name) {
+  const std::string word = lower_case(name);
   // The first of each row is ours.
   static const std::vector<std::vector<std::string>> kNames = {
-      {"int8", "MET_CHAR", "signed char", "int8_t"},
-      {"uint8", "MET_UCHAR", "uchar", "unsigned char", "uint8_t"},
-      {"int16", "MET_SHORT", "short", "short int", "int16_t", "signed short", "signed short int"},
-      {"uint16", "MET_USHORT", "ushort", "unsigned short", "uint16_t", "unsigned short int"},
-      {"int32", "MET_INT", "int", "signed int", "int32_t"},
-      {"uint32", "MET_UINT", "uint", "unsigned int", "uint32_t"},
+      {"int8", "met_char", "signed char", "int8_t"},
+      {"uint8", "met_uchar", "uchar", "unsigned char", "uint8_t"},
+      {"int16", "met_short", "short", "short int", "int16_t", "signed short", "signed short int"},
+      {"uint16", "met_ushort", "ushort", "unsigned short", "uint16_t", "unsigned short int"},
+      {"int32", "met_int", "int", "signed int", "int32_t"},
+      {"uint32", "met_uint", "uint", "unsigned int", "uint32_t"},
       {"int64", "longlong", "long long", "long long int", "signed long long",
        "signed long long int", "int64_t"},
       {"uint64", "ulonglong", "unsigned long long", "unsigned long long int", "uint64_t"},
-      {"float", "MET_FLOAT"},
-      {"double", "MET_DOUBLE"}};
+      {"float", "met_float"},
+      {"double", "met_double"}};
   for (const auto& names : kNames) {
-    if (std::find(names.begin(), names.end(), name) != names.end()) return names.front();
+    if (std::find(names.begin(), names.end(), word) != names.end()) return names.front();
   }
   return name;
 }

@@ -23,7 +23,7 @@ struct PackedValues {
 };
 inline constexpr std::int64_t kLargestSize = 1'000'000;
 
-// A name of a type in MetaImage or NRRD as one of those above; others unchanged.
+// A name of a type in MetaImage or NRRD, in any case, as one of those above; others unchanged.
 std::string element_type(const std::string& name);
 
 // The whole numbers of `text` between blanks. kUnreadable, "FIELD = TEXT: ...", unless each of them

@@ -322,6 +322,18 @@ void YamlSection::numbers(const std::string& key, std::vector<double>& value, Pr
   value = std::move(parsed);
 }
 
+void YamlSection::integers(const std::string& key, std::vector<int>& value, Presence presence) {
+  const std::shared_ptr<Node> node = take(key, presence);
+  if (!node) return;
+  std::vector<int> parsed(node->yaml.IsSequence() ? node->yaml.size() : 1);
+  bool ok = !parsed.empty();
+  for (std::size_t i = 0; ok && i < parsed.size(); ++i) {
+    ok = parse_scalar(node->yaml.IsSequence() ? node->yaml[i] : node->yaml, parsed[i]);
+  }
+  if (!ok) return refuse_value(key, *node, "must be an integer or a list of integers");
+  value = std::move(parsed);
+}
+
 std::vector<std::string> YamlSection::names() {
   std::vector<std::string> keys;
   if (!node_) return keys;

@@ -70,6 +70,9 @@ class YamlSection {
   // [a, b, ...], possibly empty
   void numbers(const std::string& key, std::vector<double>& value,
                Presence presence = Presence::kOptional);
+  // a, or [a, b, ...]; at least one
+  void integers(const std::string& key, std::vector<int>& value,
+                Presence presence = Presence::kOptional);
   // All keys, in order, for sections whose keys are names; they count as known.
   std::vector<std::string> names();
   // Records that a key is wrong in a way that only its reader knows: "KEY: what".

@@ -2,7 +2,8 @@
 #include "common/io/geometry/mesh_file.hpp"
 
 #include <algorithm>
-#include <cctype>
+#include <array>
+#include <set>
 
 #include "common/io/files/file_access.hpp"
 #include "common/io/geometry/mesh_formats.hpp"
@@ -35,7 +36,8 @@ Status check_indices(const Points& points, const Cells& cells, const std::string
   return {};
 }
 
-// Drops nodes without a tetrahedron, and triangles that need one of them.
+// Drops nodes without a tetrahedron, triangles that need one of them, and those that their group
+// has already.
 GroupedMesh without_unreferenced_nodes(const GroupedMesh& grouped) {
   const TetMesh& mesh = grouped.mesh;
   std::vector<int> new_index(static_cast<std::size_t>(mesh.num_nodes()), -1);
@@ -55,17 +57,39 @@ GroupedMesh without_unreferenced_nodes(const GroupedMesh& grouped) {
     kept.mesh.tets.data()[i] = new_index[static_cast<std::size_t>(mesh.tets.data()[i])];
   }
   kept.triangle_labels.clear();
+  std::set<std::array<int, 4>> seen;  // a group that has a triangle twice would load it twice
   Eigen::Index triangles = 0;
   for (Eigen::Index t = 0; t < grouped.triangles.cols(); ++t) {
     Eigen::Vector3i corners;
     for (int k = 0; k < 3; ++k)
       corners[k] = new_index[static_cast<std::size_t>(grouped.triangles(k, t))];
     if (corners.minCoeff() < 0) continue;
+    Eigen::Vector4i key(corners[0], corners[1], corners[2],
+                        grouped.triangle_labels[static_cast<std::size_t>(t)]);
+    std::sort(key.data(), key.data() + 3);
+    if (!seen.insert({key[0], key[1], key[2], key[3]}).second) continue;
     kept.triangles.col(triangles++) = corners;
     kept.triangle_labels.push_back(grouped.triangle_labels[static_cast<std::size_t>(t)]);
   }
   kept.triangles.conservativeResize(Eigen::NoChange, triangles);
   return kept;
+}
+
+// Drops vertices without a triangle, where there are triangles.
+TriangleSurface without_unused_vertices(TriangleSurface surface) {
+  if (surface.num_triangles() == 0) return surface;
+  std::vector<int> new_index(static_cast<std::size_t>(surface.num_vertices()), -1);
+  for (const int v : surface.triangles.reshaped()) new_index[static_cast<std::size_t>(v)] = 0;
+  int next = 0;
+  for (int v = 0; v < surface.num_vertices(); ++v) {
+    int& index = new_index[static_cast<std::size_t>(v)];
+    if (index < 0) continue;
+    surface.vertices.col(index = next) = surface.vertices.col(v).eval();
+    ++next;
+  }
+  surface.vertices.conservativeResize(Eigen::NoChange, next);
+  for (int& v : surface.triangles.reshaped()) v = new_index[static_cast<std::size_t>(v)];
+  return surface;
 }
 
 // Of the extension's format; possibly without triangles.
@@ -83,8 +107,8 @@ Result<TriangleSurface> load_surface(const fs::path& path, bool points) {
         points ? parse_xyz(content) : parse_surface(lower_extension(path), std::move(content));
     if (!surface) return surface;
     const Status ok = check_indices(surface->vertices, surface->triangles, "triangle");
-    if (!ok) surface = tl::unexpected(ok.error());
-    return surface;
+    if (!ok) return surface = tl::unexpected(ok.error());
+    return surface = without_unused_vertices(std::move(*surface));
   });
 }
 
@@ -119,13 +143,6 @@ Result<MeshWithFields> read_vtu(const fs::path& path) {
     if (!ok) read = tl::unexpected(ok.error());
     return read;
   });
-}
-
-std::string lower_extension(const fs::path& path) {
-  std::string extension = path.extension().string();
-  std::transform(extension.begin(), extension.end(), extension.begin(),
-                 [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
-  return extension;
 }
 
 Result<TriangleSurface> read_surface_or_points(const fs::path& path) {

@@ -4,7 +4,6 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <array>
 #include <map>
 #include <optional>
 #include <set>
@@ -12,6 +11,7 @@
 
 #include "common/io/files/csv_numbers.hpp"
 #include "common/io/files/file_access.hpp"
+#include "common/io/files/table.hpp"
 
 namespace brainshift::io {
 namespace {
@@ -20,85 +20,54 @@ namespace fs = std::filesystem;
 
 constexpr std::string_view kMagic = "MNI Tag Point File";
 
-struct Columns {
+struct PairColumns {
   std::optional<std::size_t> name;
-  std::array<std::size_t, 6> at{};
+  PlaceColumns before, during;
 };
 
-// Words between underscores: "x_src_mm" is {"x", "src", "mm"}.
-std::set<std::string> words_of(const std::string& name) {
-  std::set<std::string> words;
-  std::istringstream stream(name);
-  for (std::string word; std::getline(stream, word, '_');) words.insert(word);
-  return words;
+// None: the heading does not name the six columns, each once.
+std::optional<PairColumns> columns_named(const Heading& heading) {
+  const auto before = heading.place({"before", "pre", "preop", "src", "source", "undeformed"});
+  const auto during = heading.place(
+      {"during", "after", "intra", "intraop", "post", "postop", "dst", "destination", "deformed"});
+  if (!before || !during) return std::nullopt;
+  return PairColumns{heading.name_column(), *before, *during};
 }
 
-// None: the heading does not name all six columns, each once.
-std::optional<Columns> columns_named(const std::vector<std::string>& heading) {
-  static const std::array<std::set<std::string>, 2> kSides = {
-      std::set<std::string>{"before", "src", "undeformed"},
-      std::set<std::string>{"during", "dst", "deformed"}};
-  static const std::array<const char*, 3> kAxes = {"x", "y", "z"};
-  Columns columns;
-  std::array<int, 6> found{};
-  for (std::size_t column = 0; column < heading.size(); ++column) {
-    const std::set<std::string> words = words_of(heading[column]);
-    for (const char* name : {"label", "name", "row"}) {
-      if (heading[column] == name && !columns.name) columns.name = column;
-    }
-    for (std::size_t place = 0; place < 6; ++place) {
-      const auto& side = kSides[place / 3];
-      const bool of_side = std::any_of(words.begin(), words.end(),
-                                       [&](const auto& word) { return side.count(word) > 0; });
-      if (!of_side || words.count(kAxes[place % 3]) == 0) continue;
-      columns.at[place] = column;
-      ++found[place];
-    }
-  }
-  const bool each_once = std::all_of(found.begin(), found.end(), [](int n) { return n == 1; });
-  return each_once ? std::optional(columns) : std::nullopt;
-}
-
-std::optional<Columns> columns_of_size(std::size_t cells) {
+std::optional<PairColumns> columns_of_size(std::size_t cells) {
   if (cells != 6 && cells != 7) return std::nullopt;
-  Columns columns;
+  PairColumns columns;
   if (cells == 7) columns.name = 0;
-  for (std::size_t place = 0; place < 6; ++place) columns.at[place] = place + cells - 6;
+  const std::size_t first = cells - 6;
+  columns.before.at = {first, first + 1, first + 2};
+  columns.during.at = {first + 3, first + 4, first + 5};
   return columns;
 }
 
 Result<NamedPairs> parse_csv(const std::string& content) {
-  std::optional<Columns> columns;
-  std::size_t expected = 0;
-  NamedPairs pairs;
-  for (const auto& [number, text] : content_lines(content)) {
-    const auto cells = quoted_cells_of(text);
-    const bool first = expected == 0;
-    const bool heading = first && !has_number(cells);
-    if (first) {
-      expected = cells.size();
-      columns = heading ? columns_named(cells) : std::nullopt;
-      if (!columns) columns = columns_of_size(cells.size());
-    }
-    if (!columns) {
-      return bad_line(number, text,
-                      "must be 6 numbers (before x, y, z, during x, y, z), a name and 6 numbers, "
-                      "or a heading with x_before, ..., z_during");
-    }
-    if (heading) continue;
-    std::array<double, 6> values{};
-    bool good = cells.size() == expected;
-    for (std::size_t i = 0; good && i < 6; ++i) {
-      good = parse_number(cells[columns->at[i]], values[i]);
-    }
-    if (!good) {
-      return bad_line(number, text,
-                      fmt::format("must have {} cells, six of them finite numbers", expected));
-    }
-    pairs.add(columns->name ? cells[*columns->name] : std::string(),
-              Vec3(values[0], values[1], values[2]), Vec3(values[3], values[4], values[5]));
+  const Table table = parse_table(content);
+  if (table.rows.empty()) return fail(ErrorCode::kEmptySet, "holds no landmark");
+  const TableRow& first = table.heading ? table.heading_row : table.rows.front();
+  const auto columns =
+      table.heading ? columns_named(*table.heading) : columns_of_size(first.cells.size());
+  if (!columns) {
+    return bad_line(first.line, first.text,
+                    "must be 6 numbers (before x, y, z, during x, y, z), a name and 6 numbers, "
+                    "or a heading with x_before, ..., z_during, each once");
   }
-  if (pairs.names.empty()) return fail(ErrorCode::kEmptySet, "holds no landmark");
+  NamedPairs pairs;
+  for (const TableRow& row : table.rows) {
+    const auto placed = table.heading ? table.heading->placed(row.cells) : Result<bool>(true);
+    if (!placed) return bad_line(row.line, row.text, placed.error().message);
+    if (!*placed) continue;
+    const auto before = columns->before.of(row.cells), during = columns->during.of(row.cells);
+    if (!before || !during || row.cells.size() != first.cells.size()) {
+      return bad_line(
+          row.line, row.text,
+          fmt::format("must have {} cells, six of them finite numbers", first.cells.size()));
+    }
+    pairs.add(columns->name ? row.cells[*columns->name] : std::string(), *before, *during);
+  }
   return pairs;
 }
 
@@ -125,6 +94,16 @@ bool parse_tag(std::string_view text, NamedPairs& pairs) {
   return true;
 }
 
+// Without what follows a % or # that is not in a name.
+std::string_view without_comment(std::string_view text) {
+  bool quoted = false;
+  for (std::size_t i = 0; i < text.size(); ++i) {
+    if (text[i] == '"') quoted = !quoted;
+    if (!quoted && (text[i] == '%' || text[i] == '#')) return trimmed(text.substr(0, i));
+  }
+  return text;
+}
+
 // The value of "NAME = VALUE", with or without the semicolon behind it.
 std::optional<std::string_view> value_of(std::string_view line, std::string_view name) {
   auto value = assigned_value(line, name);
@@ -139,8 +118,8 @@ Result<NamedPairs> parse_tag_file(const std::string& content) {
   enum class At { kStart, kHeader, kPoints, kEnd } at = At::kStart;
   bool two_volumes = false;
   for (int number = 1; std::getline(lines, line); ++number) {
-    std::string_view text = trimmed(line);
-    if (text.empty() || text.front() == '%' || text.front() == '#') continue;
+    std::string_view text = without_comment(trimmed(line));
+    if (text.empty()) continue;
     const auto refuse = [&](const char* what) { return bad_line(number, text, what); };
     if (at == At::kStart) {
       if (text != kMagic) return unreadable("is no MNI tag point file");
@@ -156,8 +135,9 @@ Result<NamedPairs> parse_tag_file(const std::string& content) {
         return refuse("is neither \"Volumes = 2;\" nor \"Points =\"");
       }
     } else if (at == At::kPoints) {
-      const bool last = text.ends_with(';');
-      if (last) text = trimmed(text.substr(0, text.size() - 1));
+      // Where a comment stands behind the last point, the semicolon stands behind the comment.
+      const bool last = text.ends_with(';') || trimmed(line).ends_with(';');
+      if (text.ends_with(';')) text = trimmed(text.substr(0, text.size() - 1));
       if (!(last && text.empty()) && !parse_tag(text, pairs)) {
         return refuse("must be 6 or 9 finite numbers and perhaps a name in quotation marks");
       }
@@ -168,7 +148,19 @@ Result<NamedPairs> parse_tag_file(const std::string& content) {
   }
   if (at == At::kStart) return unreadable("is no MNI tag point file");
   if (at != At::kEnd) return unreadable("is truncated: no \";\" ends its points");
+  return pairs;
+}
+
+// A pair that a file has twice would count twice.
+Result<NamedPairs> checked_pairs(NamedPairs pairs) {
   if (pairs.names.empty()) return fail(ErrorCode::kEmptySet, "holds no landmark");
+  for (std::size_t i = 0; i < pairs.names.size(); ++i) {
+    for (std::size_t k = 0; k < i; ++k) {
+      if (pairs.first[i] != pairs.first[k] || pairs.second[i] != pairs.second[k]) continue;
+      return unreadable(fmt::format("landmarks {} and {} are the same pair, \"{}\"", k + 1, i + 1,
+                                    pairs.names[i]));
+    }
+  }
   return pairs;
 }
 
@@ -222,7 +214,7 @@ Result<NamedPairs> pair_by_name(const NamedPoints& first, const NamedPoints& sec
 }
 
 Result<NamedPairs> read_pairs(const fs::path& path) {
-  const std::string extension = path.extension().string();
+  const std::string extension = lower_extension(path);
   if (extension == ".json" || extension == ".fcsv") {
     return unreadable(path,
                       "holds where the landmarks were at one time: a second file must say where "
@@ -232,7 +224,8 @@ Result<NamedPairs> read_pairs(const fs::path& path) {
     return unreadable(path, "landmarks must be a .csv or .tag file");
   }
   return parse_file(path, [&](const std::string& content) {
-    return extension == ".csv" ? parse_csv(content) : parse_tag_file(content);
+    return (extension == ".csv" ? parse_csv(content) : parse_tag_file(content))
+        .and_then(checked_pairs);
   });
 }
 

@@ -5,13 +5,14 @@
 // In one file:
 //   .csv  rows of 6 numbers (before x, y, z, during x, y, z), or of a name and these; or any
 //         columns below a heading that names the six, e.g. x_before,y_before,z_before,x_during, ...
-//         (for before also src or undeformed, for during dst or deformed; _mm is ignored) and
-//         perhaps label, name or row
+//         (for before also pre, preop, src, source, undeformed; for during after, intra, intraop,
+//         post, postop, dst, destination, deformed; files/table.hpp) and perhaps label, name or
+//         row, and defined. Another heading is refused.
 //   .tag  MNI tag points of two volumes: 6 numbers, perhaps weight, structure and patient, and a
 //         name in quotation marks
 //         (source: MNI, "MNI Tag Point File", as register and tagtoxfm of MINC read it)
 // In two files: point_file.hpp, paired by name.
-// Lines of a .csv that begin with # are skipped; in a .tag those that begin with % or #.
+// Lines of a .csv that begin with # are skipped; in a .tag what follows % or #.
 #pragma once
 
 #include <filesystem>

@@ -5,12 +5,12 @@
 #include <nlohmann/json.hpp>
 
 #include <algorithm>
-#include <array>
 #include <optional>
 #include <sstream>
 
 #include "common/io/files/csv_numbers.hpp"
 #include "common/io/files/file_access.hpp"
+#include "common/io/files/table.hpp"
 
 namespace brainshift::io {
 namespace {
@@ -21,14 +21,16 @@ using nlohmann::json;
 
 constexpr std::string_view kSlicersColumns =
     "id,x,y,z,ow,ox,oy,oz,vis,sel,lock,label,desc,associatedNodeID";
+constexpr std::size_t kSlicersColumnCount = 14;
 
-Result<Vec3> signs_to_ras(const std::string& system) {
-  if (system == "RAS" || system == "0") return Vec3(1, 1, 1);
-  if (system == "LPS" || system == "1") return Vec3(-1, -1, 1);
+Result<Vec3> signs_to_ras(const std::string& said) {
+  const std::string system = lower_case(said);
+  if (system == "ras" || system == "0") return Vec3(1, 1, 1);
+  if (system == "lps" || system == "1") return Vec3(-1, -1, 1);
   if (system.empty()) {
     return unreadable("coordinateSystem is missing: its points could be mirrored");
   }
-  return unreadable("coordinateSystem = " + system.substr(0, 30) + ": must be LPS or RAS");
+  return unreadable("coordinateSystem = " + said.substr(0, 30) + ": must be LPS or RAS");
 }
 
 // A text, or the text of a number; empty for anything else.
@@ -69,11 +71,6 @@ Status take_point(const json& point, std::size_t number, const Vec3& signs, Name
   return {};
 }
 
-std::size_t column_of(const std::vector<std::string>& columns, const char* name) {
-  return static_cast<std::size_t>(std::find(columns.begin(), columns.end(), name) -
-                                  columns.begin());
-}
-
 Result<NamedPoints> parse_markups_json(const std::string& content) {
   const json document = json::parse(content, nullptr, false);
   const auto list = document.is_object() ? document.find("markups") : document.end();
@@ -105,10 +102,19 @@ Result<NamedPoints> parse_markups_json(const std::string& content) {
   return named;
 }
 
+// Slicer 5 writes two columns more than it names: the state of the position (2: it was placed) and
+// whether the point was made by a program.
+bool was_placed(const Heading& columns, const Cells& cells) {
+  const auto named = columns.column({"positionstatus"});
+  const std::size_t at = named.value_or(kSlicersColumnCount);
+  if (!named && columns.size() != kSlicersColumnCount) return true;
+  return at >= cells.size() || cells[at].empty() || cells[at] == "2" || cells[at] == "defined";
+}
+
 Result<NamedPoints> parse_fcsv(const std::string& content) {
   std::istringstream lines(content);
   std::string line, system;
-  std::vector<std::string> columns = quoted_cells_of(kSlicersColumns);
+  Heading columns(quoted_cells_of(kSlicersColumns));
   NamedPoints named;
   for (int number = 1; std::getline(lines, line); ++number) {
     const std::string_view text = trimmed(line);
@@ -116,105 +122,67 @@ Result<NamedPoints> parse_fcsv(const std::string& content) {
     if (text.front() == '#') {
       const std::string_view comment = trimmed(text.substr(1));
       if (const auto value = assigned_value(comment, "CoordinateSystem")) system = *value;
-      if (const auto value = assigned_value(comment, "columns")) columns = quoted_cells_of(*value);
+      if (const auto value = assigned_value(comment, "columns")) {
+        columns = Heading(quoted_cells_of(*value));
+        if (!columns.place({}, {"xyz"})) {
+          return bad_line(number, text, "must name columns x, y and z, each once");
+        }
+      }
       continue;
     }
     const auto signs = signs_to_ras(system);
     if (!signs) return tl::unexpected(signs.error());
     const auto cells = quoted_cells_of(text);
-    const auto cell = [&](const char* name) {
-      const std::size_t at = column_of(columns, name);
-      return at < cells.size() && at < columns.size() ? cells[at] : std::string();
-    };
-    Vec3 point;
-    if (!parse_number(cell("x"), point[0]) || !parse_number(cell("y"), point[1]) ||
-        !parse_number(cell("z"), point[2])) {
-      return bad_line(number, text, "must have finite numbers as x, y and z");
-    }
-    named.add(cell("label"), signs->cwiseProduct(point));
+    if (!was_placed(columns, cells)) continue;
+    const auto point = columns.place({}, {"xyz"})->of(cells);
+    if (!point) return bad_line(number, text, "must have finite numbers as x, y and z");
+    const auto label = columns.column({"label"});
+    named.add(label && *label < cells.size() ? cells[*label] : std::string(),
+              signs->cwiseProduct(*point));
   }
-  if (named.names.empty()) return fail(ErrorCode::kEmptySet, "holds no point");
+  if (named.names.empty()) return fail(ErrorCode::kEmptySet, "holds no point that was placed");
   return named;
 }
 
 // ---- tables ----
 
-// Where in a row the name and the coordinates are.
-struct PointColumnsOf {
-  std::optional<std::size_t> name;
-  std::array<std::size_t, 3> at{};
-  Vec3 signs = Vec3(1, 1, 1);  // to RAS
-};
-
-// None: the heading has no such columns.
-std::optional<PointColumnsOf> point_columns_named(const std::vector<std::string>& heading) {
-  struct Spelling {
-    std::array<const char*, 3> names;
-    Vec3 signs;
-  };
-  const std::array<Spelling, 3> spellings = {Spelling{{"x", "y", "z"}, Vec3(1, 1, 1)},
-                                             Spelling{{"r", "a", "s"}, Vec3(1, 1, 1)},
-                                             Spelling{{"l", "p", "s"}, Vec3(-1, -1, 1)}};
-  const auto find = [&](const char* name) {
-    return static_cast<std::size_t>(std::find(heading.begin(), heading.end(), name) -
-                                    heading.begin());
-  };
-  PointColumnsOf columns;
-  for (const char* name : {"label", "name"}) {
-    if (find(name) < heading.size()) columns.name = find(name);
-  }
-  for (const Spelling& spelling : spellings) {
-    for (std::size_t i = 0; i < 3; ++i) columns.at[i] = find(spelling.names[i]);
-    columns.signs = spelling.signs;
-    if (*std::max_element(columns.at.begin(), columns.at.end()) < heading.size()) return columns;
-  }
-  return std::nullopt;
-}
-
-// Of rows without a heading.
-PointColumnsOf point_columns_of_size(std::size_t cells) {
-  PointColumnsOf columns;
-  const std::size_t first = cells == 4 ? 1 : 0;
-  if (cells == 4) columns.name = 0;
-  columns.at = {first, first + 1, first + 2};
-  return columns;
-}
-
 Result<NamedPoints> parse_points(const std::string& content) {
-  std::optional<PointColumnsOf> columns;
-  std::size_t expected = 0;  // cells of a row; 0: a heading decides
+  const Table table = parse_table(content);
+  if (table.rows.empty()) return fail(ErrorCode::kEmptySet, "holds no point");
+  // Without a heading: x,y,z or name,x,y,z, as the first row has it.
+  const std::size_t expected = table.heading ? 0 : table.rows.front().cells.size();
+  const std::size_t first = expected == 4 ? 1 : 0;
+  std::optional<PlaceColumns> columns = PlaceColumns{{first, first + 1, first + 2}};
+  std::optional<std::size_t> name;
+  if (expected == 4) name = 0;
+  if (table.heading) {
+    columns = table.heading->place();
+    name = table.heading->name_column();
+  } else if (expected != 3 && expected != 4) {
+    columns.reset();
+  }
+  if (!columns) {
+    const TableRow& row = table.heading ? table.heading_row : table.rows.front();
+    return bad_line(row.line, row.text,
+                    "must be x,y,z or name,x,y,z, or a heading with the columns x,y,z or r,a,s or "
+                    "l,p,s, each once");
+  }
   NamedPoints named;
-  bool first = true;
-  for (const auto& [number, text] : content_lines(content)) {
-    const auto cells = quoted_cells_of(text);
-    const bool heading = first && !has_number(cells);
-    if (first && !heading && (cells.size() == 3 || cells.size() == 4)) {
-      columns = point_columns_of_size(expected = cells.size());
-    } else if (heading) {
-      columns = point_columns_named(cells);
-    }
-    first = false;
-    if (!columns) {
-      return bad_line(number, text,
-                      "must be x,y,z or name,x,y,z, or a heading with the columns x,y,z or r,a,s "
-                      "or l,p,s");
-    }
-    if (heading) continue;
-    const auto cell = [&](std::size_t at) { return at < cells.size() ? cells[at] : std::string(); };
-    Vec3 point;
-    const bool numbers = parse_number(cell(columns->at[0]), point[0]) &&
-                         parse_number(cell(columns->at[1]), point[1]) &&
-                         parse_number(cell(columns->at[2]), point[2]);
-    if (!numbers || (expected != 0 && cells.size() != expected)) {
-      return bad_line(number, text,
+  for (const TableRow& row : table.rows) {
+    const auto placed = table.heading ? table.heading->placed(row.cells) : Result<bool>(true);
+    if (!placed) return bad_line(row.line, row.text, placed.error().message);
+    if (!*placed) continue;
+    const auto point = columns->of(row.cells);
+    const std::size_t most = table.heading ? table.heading->size() : expected;
+    if (!point || row.cells.size() > most || row.cells.size() < expected) {
+      return bad_line(row.line, row.text,
                       expected == 4
                           ? "must have three finite numbers behind a name, as the rows above"
-                          : "must have three finite numbers");
+                          : "must have three finite numbers, and no more cells than the heading");
     }
-    named.add(columns->name ? cell(*columns->name) : std::string(),
-              columns->signs.cwiseProduct(point));
+    named.add(name && *name < row.cells.size() ? row.cells[*name] : std::string(), *point);
   }
-  if (named.names.empty()) return fail(ErrorCode::kEmptySet, "holds no point");
+  if (named.names.empty()) return fail(ErrorCode::kEmptySet, "holds no point that was placed");
   return named;
 }
 
@@ -230,7 +198,7 @@ bool NamedPoints::all_named() const {
 }
 
 Result<NamedPoints> read_points(const std::filesystem::path& path) {
-  const std::string extension = path.extension().string();
+  const std::string extension = lower_extension(path);
   if (extension != ".json" && extension != ".fcsv" && extension != ".csv") {
     return unreadable(path, "points must be a .mrk.json, .fcsv or .csv file");
   }

@@ -7,10 +7,12 @@
 //                     A point whose positionStatus is not "defined" was not placed and is left out.
 //   .fcsv             3D Slicer's, taken to RAS: "# CoordinateSystem = LPS" and
 //                     "# columns = id,x,y,z,...,label,..." above rows of cells; without the second
-//                     line, Slicer's own order of columns
+//                     line, Slicer's own order of columns. Slicer 5 writes a 15th, unnamed: a point
+//                     whose value there is not 2 was not placed and is left out.
 //   .csv              rows x,y,z or name,x,y,z, in whatever frame the user means; or a heading with
 //                     the columns x,y,z, or r,a,s, or l,p,s (as Slicer's tables have them; taken to
-//                     RAS), and perhaps label or name. Lines that begin with # are skipped.
+//                     RAS), and perhaps label or name, and defined: 0 leaves the point out
+//                     (files/table.hpp). Another heading is refused.
 // The coordinate system of Slicer's lists: RAS or 0, LPS or 1 (numbers in files of Slicer before
 // 4.11). A file that does not say is refused: its points could be mirrored twice.
 // Source: Slicer's vtkMRMLMarkupsStorageNode and the schema markups-schema-v1.0.3.

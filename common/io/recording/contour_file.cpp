@@ -3,12 +3,15 @@
 
 #include <fmt/format.h>
 
+#include <array>
 #include <cmath>
 #include <nlohmann/json.hpp>
+#include <optional>
 #include <set>
 
 #include "common/io/files/csv_numbers.hpp"
 #include "common/io/files/file_access.hpp"
+#include "common/io/files/table.hpp"
 
 namespace brainshift::io {
 namespace {
@@ -24,30 +27,43 @@ struct Row {
   Eigen::Vector2d at_px = Eigen::Vector2d::Zero();
 };
 
-bool parse_row(std::string_view text, Row& row) {
-  const auto cells = cells_of(text);
-  double frame = 0.0;
-  if (cells.size() != 3 || !parse_number(cells[0], frame) ||
-      !parse_number(cells[1], row.at_px.x()) || !parse_number(cells[2], row.at_px.y())) {
-    return false;
+using RowColumns = std::array<std::size_t, 3>;  // frame, u, v
+
+std::optional<RowColumns> pixel_columns(const Heading& heading) {
+  const Heading::Words pixels = {"px", "pixel", "pixels"};
+  const auto frame = heading.column({"frame", "image"}, {"number", "index"});
+  const auto u = heading.column({"u", "x"}, pixels), v = heading.column({"v", "y"}, pixels);
+  if (!frame || !u || !v) return std::nullopt;
+  return RowColumns{*frame, *u, *v};
+}
+
+bool parse_row(const Cells& cells, const RowColumns& columns, Row& row) {
+  double numbers[3];
+  for (std::size_t i = 0; i < 3; ++i) {
+    if (columns[i] >= cells.size() || !parse_number(cells[columns[i]], numbers[i])) return false;
   }
+  const double frame = numbers[0];
   if (frame < 0.0 || frame > kMaxFrames || frame != std::floor(frame)) return false;
   row.frame = static_cast<int>(frame);
+  row.at_px = {numbers[1], numbers[2]};
   return true;
 }
 
 Result<std::vector<Row>> read_rows(const std::string& content) {
+  const Table table = parse_table(content, true);
+  std::optional<RowColumns> columns = RowColumns{0, 1, 2};
+  if (table.heading) columns = pixel_columns(*table.heading);
+  if (!columns) {
+    return bad_line(table.heading_row.line, table.heading_row.text,
+                    "must name the columns frame, u_px and v_px, each once");
+  }
   std::vector<Row> rows;
-  bool heading_allowed = true;
-  for (const auto& [line, text] : content_lines(content)) {
-    const std::string_view cells = trimmed(std::string_view(text).substr(0, text.find('#')));
+  for (const TableRow& cells : table.rows) {
     Row row;
-    row.line = line;
-    const bool heading = heading_allowed && cells == "frame,u_px,v_px";
-    heading_allowed = false;
-    if (heading) continue;
-    if (!parse_row(cells, row)) {
-      return bad_line(line, cells, "must be frame,u_px,v_px with a frame from 0");
+    row.line = cells.line;
+    const std::size_t size = table.heading ? table.heading->size() : 3;
+    if (cells.cells.size() != size || !parse_row(cells.cells, *columns, row)) {
+      return bad_line(cells.line, cells.text, "must be frame,u_px,v_px with a frame from 0");
     }
     rows.push_back(row);
   }
@@ -130,8 +146,8 @@ Result<std::vector<ultrasound::Contour>> contours_of_json(const std::string& con
 Result<std::vector<ultrasound::Contour>> read_contours(const fs::path& path, bool closed) {
   using Contours = std::vector<ultrasound::Contour>;
   return parse_file(path, [&](const std::string& content) -> Result<Contours> {
-    if (path.extension() == ".json") return contours_of_json(content);
-    if (path.extension() != ".csv") return unreadable("contours must be a .csv or .json file");
+    if (lower_extension(path) == ".json") return contours_of_json(content);
+    if (lower_extension(path) != ".csv") return unreadable("contours must be a .csv or .json file");
     return read_rows(content).and_then(
         [&](const std::vector<Row>& rows) { return contours_of_rows(rows, closed); });
   });

@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Traced contours and seeds from files.
 //
-//   .csv   rows frame,u_px,v_px, a heading allowed; the rows of one frame, in order, are a contour
+//   .csv   rows frame,u_px,v_px, or columns in the order that a heading names (also image, x, y,
+//          without _px); the rows of one frame, in order, are a contour
 //   .json  {"contours": [{"frame": 12, "closed": true, "points_px": [[u, v], ...]}, ...]}
 // Frames count from 0; pixels as tracking::Recording has them (orientation MF). '#' begins a
 // comment in a .csv.

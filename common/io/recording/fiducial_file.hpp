@@ -1,12 +1,14 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Fiducials for the patient registration, from a .csv; lengths mm, '#' begins a comment, a
-// heading is allowed.
+// Fiducials for the patient registration, from a .csv; lengths mm, '#' begins a comment.
 //
 //   reference_x,reference_y,reference_z,ras_x,ras_y,ras_z
-//       a pair per row: touched by the pointer, and in the image
+//       a pair per row: touched by the pointer, and in the image. A heading gives another order:
+//       an axis and ref, reference, touched, tracker or measured (or the axis alone), and an axis
+//       and ras, image, mri, ct or lps (or r,a,s or l,p,s), perhaps defined (files/table.hpp)
 //   reference,x,y,z  and  ras,x,y,z
 //       a point per row where the order is not known. The correspondence is found
-//       (registration/fiducials.hpp).
+//       (registration/fiducials.hpp). A heading names list, x, y and z.
+// Another heading is refused.
 #pragma once
 
 #include <filesystem>

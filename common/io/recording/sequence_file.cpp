@@ -4,7 +4,6 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <cctype>
 #include <charconv>
 #include <cmath>
 #include <optional>
@@ -133,24 +132,14 @@ Status read_frame_fields(const SequenceHeader& header, int count, tracking::Reco
 
 constexpr std::int64_t kLargestImage = 16384;  // pixels along one side
 
-// PLUS writes the same names into NRRD in lower case and with spaces.
-std::string find_field(const SequenceHeader& header, const std::string& meta_name,
-                       const std::string& nrrd_name) {
-  for (const std::string& name : {meta_name, nrrd_name}) {
-    const auto found = header.fields.find(name);
-    if (found != header.fields.end()) return found->second;
-  }
-  return {};
-}
-
 struct Flip {
   bool u = false;
   bool v = false;
 };
 
 Result<Flip> flip_to_mf(const SequenceHeader& header, const SequenceOptions& options) {
-  std::string text =
-      find_field(header, "UltrasoundImageOrientation", "ultrasound image orientation");
+  // PLUS writes the same names into NRRD in lower case and with spaces.
+  std::string text = header.field("UltrasoundImageOrientation");
   if (text.empty()) text = options.orientation;
   if (text.empty()) {
     return unreadable("UltrasoundImageOrientation is missing: the image's axes could be mirrored");
@@ -219,7 +208,7 @@ Status read_images(const SequenceHeader& header, const SequenceOptions& options,
   const auto type = pixel_type(header);
   if (!type) return tl::unexpected(type.error());
   recording.pixel_type = *type;
-  const std::string kind = find_field(header, "UltrasoundImageType", "ultrasound image type");
+  const std::string kind = header.field("UltrasoundImageType");
   if (!kind.empty() && kind != "BRIGHTNESS") {
     return unreadable("UltrasoundImageType = " + kind + ": must be BRIGHTNESS");
   }
@@ -260,8 +249,7 @@ Result<tracking::Recording> parse_sequence(const std::string& content, bool nrrd
 
 Result<tracking::Recording> read_sequence(const std::filesystem::path& path,
                                           const SequenceOptions& options) {
-  std::string extension = path.extension().string();
-  for (char& c : extension) c = static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
+  const std::string extension = lower_extension(path);
   if (extension != ".mha" && extension != ".nrrd") {
     return unreadable(path, "must be a sequence file .mha or .nrrd");
   }

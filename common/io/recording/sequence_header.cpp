@@ -4,6 +4,7 @@
 #include <fmt/format.h>
 
 #include <charconv>
+#include <optional>
 
 #include "common/io/files/csv_numbers.hpp"
 #include "common/io/files/file_access.hpp"
@@ -12,6 +13,10 @@ namespace brainshift::io {
 namespace {
 
 constexpr std::string_view kFramePrefix = "Seq_Frame";
+
+bool names_equal(std::string_view a, std::string_view b) {
+  return !BeforeByLetters{}(a, b) && !BeforeByLetters{}(b, a);
+}
 
 // Puts a key either among the file's fields or, "Seq_Frame0012_Name", among those of a frame.
 Status store(SequenceHeader& header, std::string_view key, std::string_view value) {
@@ -34,6 +39,15 @@ Status store(SequenceHeader& header, std::string_view key, std::string_view valu
   return {};
 }
 
+// None: the header does not say.
+Result<std::optional<bool>> flag(const SequenceHeader& header, const std::string& key) {
+  const std::string text = header.word(key);
+  if (text.empty()) return std::optional<bool>();
+  if (text == "true" || text == "t" || text == "1") return std::optional(true);
+  if (text == "false" || text == "f" || text == "0") return std::optional(false);
+  return unreadable(fmt::format("{} = {}: must be True or False", key, header.field(key)));
+}
+
 Status understand_meta(SequenceHeader& header) {
   const std::string dim_size = header.field("DimSize");
   auto sizes = parse_sizes("DimSize", dim_size, 0);
@@ -45,17 +59,23 @@ Status understand_meta(SequenceHeader& header) {
                                   dimensions, header.sizes.size(), dim_size));
   }
   header.element_type = element_type(header.field("ElementType"));
-  const auto flag = [&](const std::string& key, bool& value) -> Status {
-    const std::string text = header.field(key);
-    if (!text.empty() && text != "True" && text != "False") {
-      return unreadable(fmt::format("{} = {}: must be True or False", key, text));
+  // MetaIO looks at the first letter alone, and calls the byte order by two names.
+  std::optional<bool> big_endian;
+  for (const char* key : {"BinaryDataByteOrderMSB", "ElementByteOrderMSB"}) {
+    const auto said = flag(header, key);
+    if (!said) return tl::unexpected(said.error());
+    if (*said && big_endian && *big_endian != **said) {
+      return unreadable("BinaryDataByteOrderMSB and ElementByteOrderMSB contradict each other");
     }
-    value = text == "True";
-    return {};
-  };
-  if (Status ok = flag("BinaryDataByteOrderMSB", header.big_endian); !ok) return ok;
-  if (Status ok = flag("CompressedData", header.compressed); !ok) return ok;
-  if (header.field("BinaryData") == "False") {
+    if (*said) big_endian = *said;
+  }
+  header.big_endian = big_endian.value_or(false);
+  const auto compressed = flag(header, "CompressedData");
+  if (!compressed) return tl::unexpected(compressed.error());
+  header.compressed = compressed->value_or(false);
+  const auto binary = flag(header, "BinaryData");
+  if (!binary) return tl::unexpected(binary.error());
+  if (!binary->value_or(true)) {
     return unreadable("BinaryData = False: pixels as text are not supported");
   }
   const std::string channels = header.field("ElementNumberOfChannels");
@@ -86,8 +106,8 @@ Result<SequenceHeader> parse_meta_sequence(std::string_view content) {
     }
     const std::string_view key = trimmed(line.substr(0, equals));
     const std::string_view value = trimmed(line.substr(equals + 1));
-    if (key == "ElementDataFile") {
-      if (value != "LOCAL") {
+    if (names_equal(key, "ElementDataFile")) {
+      if (!names_equal(value, "LOCAL")) {
         return unreadable(
             fmt::format("ElementDataFile = {}: must be LOCAL (pixels in the same file)", value));
       }
@@ -103,7 +123,7 @@ Result<SequenceHeader> parse_meta_sequence(std::string_view content) {
 Result<SequenceHeader> parse_nrrd_sequence(std::string_view content) {
   auto nrrd = parse_nrrd_header(content);
   if (!nrrd) return tl::unexpected(nrrd.error());
-  const std::string kinds = nrrd->field("kinds");
+  const std::string kinds = nrrd->word("kinds");
   if (!kinds.starts_with("domain") && !kinds.empty()) {
     return unreadable("kinds = " + kinds + ": the first axis must be the image's");
   }

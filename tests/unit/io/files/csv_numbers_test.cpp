@@ -15,6 +15,10 @@ TEST(CsvNumbers, CellsAreTrimmedAndOneIsAlwaysThere) {
   EXPECT_EQ(trimmed(" \t"), "");
 }
 
+TEST(CsvNumbers, LettersGetLowerAndAllElseStays) {
+  EXPECT_EQ(lower_case("Ab-Z9\xC3\x84"), "ab-z9\xC3\x84");
+}
+
 TEST(CsvNumbers, QuotedCellsKeepCommas) {
   EXPECT_THAT(quoted_cells_of(R"(a, "b, c" ,"say ""x""",)"),
               ElementsAre("a", "b, c", "say \"x\"", ""));
@@ -34,6 +38,8 @@ TEST(CsvNumbers, ANumberIsTheWholeTextAndFinite) {
   }
   EXPECT_TRUE(parse_number("-2.5e1", number));
   EXPECT_EQ(number, -25.0);
+  EXPECT_TRUE(parse_number("+7", number));
+  EXPECT_FALSE(parse_number("+-7", number));
 }
 
 }  // namespace

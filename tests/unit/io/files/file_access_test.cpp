@@ -92,5 +92,35 @@ TEST(FileAccess, TwoWritersOfOneFileDoNotMeet) {
   EXPECT_EQ(content_of(folder / "f"), "second");
 }
 
+TEST(ByteOrderMark, OfUtf8IsCutOffAndUtf16IsNamed) {
+  EXPECT_EQ(value_or_fail(without_byte_order_mark("\xEF\xBB\xBFx,y")), "x,y");
+  EXPECT_EQ(value_or_fail(without_byte_order_mark("x\xEF\xBB\xBF")), "x\xEF\xBB\xBF");
+  EXPECT_EQ(value_or_fail(without_byte_order_mark("")), "");
+  for (const auto& text : {std::string("\xFF\xFEx\0", 4), std::string("\xFE\xFF\0x", 4)}) {
+    EXPECT_THAT(refusal_of(without_byte_order_mark(text)), testing::HasSubstr("UTF-16"));
+  }
+  const std::string xml("\xFF\xFE<\0", 4);
+  EXPECT_EQ(value_or_fail(without_byte_order_mark(xml)), xml);
+}
+
+TEST(ByteOrderMark, NoParserSeesIt) {
+  const test_support::TemporaryFolder folder;
+  const auto path = folder.write("a.csv",
+                                 "\xEF\xBB\xBF"
+                                 "1,2");
+  EXPECT_EQ(value_or_fail(read_text(path)), "1,2");
+  const auto same = [](const std::string& content) -> Result<std::string> { return content; };
+  EXPECT_EQ(value_or_fail(parse_file(path, same)), "1,2");
+  const auto wide = folder.write("b.csv", std::string("\xFF\xFE"
+                                                      "1\0",
+                                                      4));
+  EXPECT_THAT(refusal_of(read_text(wide)), testing::StartsWith(wide.string() + ": is text"));
+}
+
+TEST(LowerExtension, HasItsDotAndNoCapitals) {
+  EXPECT_EQ(lower_extension("a/B.NII.GZ"), ".gz");
+  EXPECT_EQ(lower_extension("a.b/C"), "");
+}
+
 }  // namespace
 }  // namespace brainshift::io

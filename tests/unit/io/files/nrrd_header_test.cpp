@@ -48,6 +48,19 @@ TEST(NrrdHeader, KeepsFieldsAndKeysAndWhatFollows) {
   EXPECT_EQ(header->data, "DATA");
 }
 
+TEST(NrrdHeader, NeitherCaseNorBlanksOfNamesCount) {
+  const auto header = parse_nrrd_header(
+      "NRRD0004\nType: Unsigned Short\nDIMENSION: 1\nSizes: 2\nencoding: RAW\nEndian: Big\n"
+      "Space Directions: (1,0,0)\n\nDATA");
+  ASSERT_TRUE(header) << header.error().message;
+  EXPECT_EQ(header->element_type, "uint16");
+  EXPECT_TRUE(header->big_endian);
+  EXPECT_FALSE(header->compressed);
+  EXPECT_EQ(header->field("spacedirections"), "(1,0,0)");
+  EXPECT_EQ(header->word("type"), "unsigned short");
+  EXPECT_THAT(refusal("NRRD0004\ntype: float\nTYPE: float\n\n"), HasSubstr("given twice"));
+}
+
 TEST(NrrdHeader, RefusesWhatItCannotStandFor) {
   const auto bad = [](const char* what, const char* with) {
     return refusal(replaced(kGood, what, with));
@@ -63,7 +76,11 @@ TEST(NrrdHeader, RefusesWhatItCannotStandFor) {
   EXPECT_THAT(bad("encoding: gzip", "encoding: bzip2"), HasSubstr("encoding = bzip2"));
   EXPECT_THAT(bad("encoding: gzip", "encoding:"), HasSubstr("\"encoding:\" has no value"));
   EXPECT_THAT(bad("endian: big", "endian: middle"), HasSubstr("endian = middle"));
-  EXPECT_THAT(bad("# a comment", "data file: other.raw"), HasSubstr("data file = other.raw"));
+  EXPECT_THAT(bad("# a comment", "data file: other.raw"),
+              HasSubstr("data file = other.raw: its pixels lie elsewhere"));
+  EXPECT_THAT(bad("# a comment", "datafile: other.raw"), HasSubstr("detached header"));
+  EXPECT_THAT(refusal("NRRD0004\ndimension: 1\nsizes: 2\ndata file: a.raw\n"),
+              HasSubstr("data file = a.raw: its pixels lie elsewhere"));
   EXPECT_THAT(bad("# a comment", "byte skip: -1"), HasSubstr("byte skip = -1"));
   EXPECT_THAT(bad("# a comment", "type: float"), HasSubstr("field type is given twice"));
   EXPECT_THAT(bad("# a comment", "words alone"), HasSubstr("\"words alone\" has no value"));

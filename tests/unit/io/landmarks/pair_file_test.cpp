@@ -53,7 +53,6 @@ TEST(PairFile, TagsAndTablesSayTheSame) {
   expect_two("a.tag", kTag);
   expect_two("a.tag", replaced(kTag, "\"b c\";", "\"b c\"\n;"));
   expect_two("a.csv", "a,1,2,3,1.5,2.5,3.5\n# a comment\nb c,4,5,6,4,5,-6\n");
-  expect_two("a.csv", "name,x,y,z,u,v,w\na,1,2,3,1.5,2.5,3.5\nb c,4,5,6,4,5,-6\n");
   expect_two("a.csv", "1,2,3,1.5,2.5,3.5\n4,5,6,4,5,-6\n", {"", ""});
 }
 
@@ -64,6 +63,29 @@ TEST(PairFile, AHeadingOrdersTheColumns) {
   expect_two("a.csv",
              "x_during,y_during,z_during,label,note,z_before,y_before,x_before\n"
              "1.5,2.5,3.5,a,,3,2,1\n4,5,-6,b c,\"x, y\",6,5,4\n");
+}
+
+TEST(PairFile, AHeadingIsObeyedAndNotSkipped) {
+  expect_two("a.csv",
+             "name,x_after,y_after,z_after,x_before,y_before,z_before\n"
+             "a,1.5,2.5,3.5,1,2,3\nb c,4,5,-6,4,5,6\n");
+  expect_two("a.csv",
+             "Name,L (before),P (before),S (before),x_Deformed,y_Deformed,z_Deformed,defined\n"
+             "a,-1,-2,3,1.5,2.5,3.5,1\nlost,0,0,0,0,0,0,0\nb c,-4,-5,6,4,5,-6,1\n");
+  expect_refused(reading_pairs("a.csv"),
+                 {{"name,x,y,z,u,v,w\na,1,2,3,4,5,6\n", "line 1: \"name,x,y,z,u,v,w\" must be"},
+                  {"x1,y1,z1,x2,y2,z2\n1,2,3,4,5,6\n", "a heading with x_before"}});
+}
+
+TEST(PairFile, CommentsStandBehindTags) {
+  expect_two("a.tag", replaced(replaced(kTag, "\"a\"", "\"a\" %TimeStamp 2020"), "\"b c\";",
+                               "\"b c\" # last;"));
+  expect_two("a.tag", replaced(kTag, "\"b c\";", "\"b c\" %x\n; % end"));
+}
+
+TEST(PairFile, APairThatIsThereTwiceWouldCountTwice) {
+  expect_refused(reading_pairs("a.csv"), {{"a,1,2,3,4,5,6\nb,1,2,3,4,5,7\nc,1,2,3,4,5,6\n",
+                                           "landmarks 1 and 3 are the same pair, \"c\""}});
 }
 
 TEST(PairFile, TwoListsOfSlicerArePairedByName) {

@@ -99,6 +99,30 @@ TEST(PointFile, TablesHaveANameOrAHeadingOrNeither) {
   EXPECT_EQ(bare.points[1], Vec3(4, 5, 6));
 }
 
+TEST(PointFile, PointsThatNobodyPlacedAreLeftOutOfEveryFormat) {
+  // Slicer 5: two columns more than are named, the first of them 2 where the point was placed.
+  expect_two_points(
+      "a.fcsv",
+      replaced(replaced(kFcsv, "nasion,,", "nasion,,,2,0"), "a note,", "a note,,2,0") +
+          "3,0,0,0,0,0,0,1,1,1,0,lost,,,0,0\n4,1,1,1,0,0,0,1,1,1,0,seen,,,1,0\n",
+      Vec3(-1, -1, 1));
+  expect_two_points("a.csv",
+                    "label,l,p,s,defined\nnasion,-1.5,-2,3,1\nlost,0,0,0,0\n"
+                    "\"left, ear\",4,-5,6.25,TRUE\n",
+                    Vec3(-1, -1, 1));
+  EXPECT_THAT(refusal_of(read("a.csv", "x,y,z,defined\n1,2,3,maybe\n")),
+              testing::HasSubstr("line 2: \"1,2,3,maybe\" has \"maybe\" as defined"));
+  EXPECT_THAT(refusal_of(read("a.csv", "x,y,z,defined\n1,2,3,0\n"), ErrorCode::kEmptySet),
+              testing::HasSubstr("no point that was placed"));
+}
+
+TEST(PointFile, AByteOrderMarkCostsNoName) {
+  expect_two_points("a.csv", "\xEF\xBB\xBFnasion,-1.5,-2,3\n\"left, ear\",4,-5,6.25\n",
+                    Vec3(1, 1, 1));
+  expect_two_points("A.CSV", "\xEF\xBB\xBFLabel,R,A,S\nnasion,-1.5,-2,3\n\"left, ear\",4,-5,6.25\n",
+                    Vec3(1, 1, 1));
+}
+
 TEST(PointFile, RefusesMarkupsThatAreNoPointList) {
   expect_refused(reading_points("a.mrk.json"),
                  {{"", "must be JSON with a list \"markups\""},
@@ -127,7 +151,7 @@ TEST(PointFile, RefusesFcsvThatDoesNotSayWhere) {
                                              "coordinateSystem is missing"},
                                             {replaced(kFcsv, "LPS", "2"), "coordinateSystem = 2"},
                                             {replaced(kFcsv, "-1.5,", "nan,"), "line 4: \"1,nan"},
-                                            {replaced(kFcsv, "x,y,z", "i,j,k"), "line 4"},
+                                            {replaced(kFcsv, "x,y,z", "i,j,k"), "line 3"},
                                             {std::string(kFcsv) + "3,1\n", "line 6: \"3,1\""}});
   expect_refused(reading_points("a.fcsv"), {{"# CoordinateSystem = LPS\n", "no point"}},
                  ErrorCode::kEmptySet);
@@ -135,7 +159,10 @@ TEST(PointFile, RefusesFcsvThatDoesNotSayWhere) {
 
 TEST(PointFile, RefusesTablesOfAnotherShape) {
   expect_refused(reading_points("a.csv"), {{"1,2\n", "line 1: \"1,2\" must be x,y,z"},
-                                           {"u,v,w\n1,2,3\n", "a heading with the columns"},
+                                           {"u,v,w\n1,2,3\n", "line 1: \"u,v,w\" must be"},
+                                           {"# u,v,w\n1,2,3\n", "line 1: \"u,v,w\" must be"},
+                                           {"x_m,y_m,z_m\n1,2,3\n", "a heading with the columns"},
+                                           {"x,y,z\n1,2,3,4\n", "no more cells"},
                                            {"1,2,3\n4,5\n", "line 2: \"4,5\""},
                                            {"a,1,2,3\n1,2,3\n", "behind a name"},
                                            {"x,y,z\n1,2,inf\n", "line 2"}});

@@ -41,6 +41,17 @@ TEST(ContourFile, CsvGroupsRowsByFrame) {
   EXPECT_EQ(contours[1].frame, 8);
 }
 
+TEST(ContourFile, AHeadingOrdersTheColumns) {
+  const TemporaryFolder folder;
+  for (const char* text : {"\xEF\xBB\xBFv_px,frame,u_px\n2,3,1.5\n", "y,Image,x,note\n2,3,1.5,a\n",
+                           "# v_px,frame,u_px\n2,3,1.5\n"}) {
+    const auto contours = value_or_fail(read_contours(folder.write("c.csv", text), false));
+    EXPECT_EQ(contours[0].frame, 3) << text;
+    EXPECT_EQ(contours[0].points_px.col(0), Eigen::Vector2d(1.5, 2)) << text;
+    EXPECT_EQ(value_or_fail(read_seeds(folder.write("s.csv", text)))[0].frame, 3);
+  }
+}
+
 TEST(ContourFile, JsonSaysWhetherEachContourIsClosed) {
   const TemporaryFolder folder;
   const auto contours = read_contours(
@@ -59,6 +70,9 @@ TEST(ContourFile, NamesLineAndValueThatAreWrong) {
   expect_refused(reading_contours("c.csv"),
                  {{"frame,u_px,v_px\n1,2,x\n", "line 2: \"1,2,x\""},
                   {"1,2\n", "line 1: \"1,2\""},
+                  {"a,b,c\n1,2,3\n", "line 1: \"a,b,c\" must name the columns frame"},
+                  {"frame,u_mm,v_mm\n1,2,3\n", "must name the columns"},
+                  {"frame,x,u,v\n1,2,3,4\n", "each once"},
                   {"1,2,3,4\n", "line 1"},
                   {"-1,2,3\n", "line 1: \"-1,2,3\""},
                   {"1.5,2,3\n", "line 1"},

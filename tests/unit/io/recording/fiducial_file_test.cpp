@@ -44,8 +44,23 @@ TEST(FiducialFile, TheOrderOfUnpairedPointsIsFound) {
   EXPECT_LT((file.fit.T_image_measured * Vec3(1, 0, 0) - Vec3(10, 21, 30)).norm(), 1e-9);
 }
 
+TEST(FiducialFile, AHeadingOrdersTheColumns) {
+  const TemporaryFolder folder;
+  for (const char* text :
+       {"x_ras,y_ras,z_ras,x_ref,y_ref,z_ref\n10,20,30,0,0,0\n10,70,30,50,0,0\n-70,20,30,0,80,0\n",
+        "name,L,P,S,touched x,touched y,touched z,defined\na,-10,-20,30,0,0,0,1\n"
+        "b,-10,-70,30,50,0,0,1\nlost,0,0,0,0,0,0,0\nc,70,-20,30,0,80,0,1\n",
+        "z,y,x,List\n0,0,0,reference\n0,0,50,reference\n0,80,0,reference\n30,20,10,ras\n"
+        "30,70,10,ras\n30,20,-70,ras\n"}) {
+    const auto file = value_or_fail(read_fiducials(folder.write("f.csv", text)));
+    EXPECT_LT((file.fit.T_image_measured * Vec3(1, 0, 0) - Vec3(10, 21, 30)).norm(), 1e-6) << text;
+  }
+}
+
 TEST(FiducialFile, NamesWhatIsWrong) {
-  EXPECT_THAT(fiducial_refusal("a,b,c,d,e,f\n1,2,3,4,5\n"), HasSubstr("line 2: \"1,2,3,4,5\""));
+  EXPECT_THAT(fiducial_refusal("a,b,c,d,e,f\n1,2,3,4,5\n"),
+              HasSubstr("line 1: \"a,b,c,d,e,f\" must name the columns x_ref"));
+  EXPECT_THAT(fiducial_refusal("1,2,3,4,5\n"), HasSubstr("line 1: \"1,2,3,4,5\""));
   EXPECT_THAT(fiducial_refusal("1,2,3,4,5,6\nras,1,2,3\n"), HasSubstr("line 2"));
   EXPECT_THAT(fiducial_refusal("1,2,3,4,5,6\ntracker,1,2,3\n"), HasSubstr("line 2"));
   EXPECT_THAT(fiducial_refusal("1,2,3,nan,5,6\n1,2,3,nan,5,6\n"), HasSubstr("line 1"));

@@ -138,6 +138,14 @@ TEST(SequenceFile, ReadsSixteenBitsOfEitherByteOrder) {
   EXPECT_EQ(a.pixels, b.pixels);
   EXPECT_EQ(a.frame_values(1)(0, 11),
             9 * 12 * 70 - 9000);  // mirrored: the first pixel is the last
+  for (const char* flag : {"ElementByteOrderMSB = True", "elementbyteordermsb=1"}) {
+    const auto c = value_or_fail(read_sequence(folder.write(
+        "C.MHA", replaced(meta_text(content, true), "BinaryDataByteOrderMSB = False", flag))));
+    EXPECT_EQ(c.pixels, a.pixels) << flag;
+  }
+  const auto both = read_sequence(folder.write(
+      "d.mha", replaced(meta_text(content, true), "NDims", "ElementByteOrderMSB = True\nNDims")));
+  EXPECT_THAT(refusal_of(both), testing::HasSubstr("contradict each other"));
 }
 
 TEST(SequenceFile, AMatrixThatIsNoRigidMotionMakesThatLinkInvalidAndIsListed) {
