@@ -6,22 +6,11 @@
 
 #include "common/io/files/binary_codec.hpp"
 #include "common/io/files/number_cursor.hpp"
+#include "common/io/geometry/element_table.hpp"
 #include "common/io/geometry/mesh_formats.hpp"
 
 namespace brainshift::io {
 namespace {
-
-constexpr int kTetrahedron = 4;
-constexpr int kTriangle = 2;
-
-// Vertices per element type.
-int vertices_of_type(std::int64_t type) {
-  // Types 1 to 31 of the reference manual.
-  constexpr int kVertices[] = {0, 2,  3,  4,  4, 8,  6,  5,  3,  6,  9, 10, 27, 18, 14, 1,
-                               8, 20, 15, 13, 9, 10, 12, 15, 15, 21, 4, 5,  6,  20, 35, 56};
-  if (type < 1 || type > 31) refuse_format("element type " + std::to_string(type) + " is unknown");
-  return kVertices[type];
-}
 
 // Numbers, lines and sections.
 class Cursor : public NumberCursor {
@@ -93,7 +82,13 @@ class Reader {
         version_4_ ? read_elements_4() : read_elements_2();
         has_elements = true;
       } else if (name == "$Entities") {
-        read_entities();
+        read_entities(false);
+      } else if (name == "$PartitionedEntities") {
+        cursor_.size();  // number of partitions
+        for (std::int64_t ghosts = cursor_.checked(cursor_.size()); ghosts > 0; --ghosts) {
+          cursor_.integer(), cursor_.integer();
+        }
+        read_entities(true);
       } else if (name == "$PhysicalNames") {
         read_physical_names();
       }
@@ -147,16 +142,24 @@ class Reader {
     }
   }
 
-  void read_entities() {
+  // Parts of entities, as partitioned meshes have them, name their parent and their partitions too.
+  void read_entities(bool parts) {
     std::int64_t counts[4];
     for (std::int64_t& count : counts) count = cursor_.checked(cursor_.size());
     for (int dimension = 0; dimension < 4; ++dimension) {
       for (std::int64_t i = 0; i < counts[dimension]; ++i) {
         const int tag = cursor_.integer();
+        bool own = true;  // the groups of a face between two parts are those of their volume
+        if (parts) {
+          own = cursor_.integer() == dimension;
+          cursor_.integer();  // tag of the parent
+          for (std::int64_t n = cursor_.checked(cursor_.size()); n > 0; --n) cursor_.integer();
+        }
         for (int k = 0; k < (dimension == 0 ? 3 : 6); ++k) cursor_.real();  // point or bounding box
         const std::int64_t physical_tags = cursor_.checked(cursor_.size());
         for (std::int64_t k = 0; k < physical_tags; ++k) {
           const int physical = cursor_.integer();
+          if (!own) continue;
           if (dimension == 3 && k == 0) physical_of_volume_[tag] = physical;
           if (dimension == 2) physicals_of_surface_[tag].push_back(physical);
         }
@@ -222,7 +225,7 @@ class Reader {
           const int tag = cursor_.integer();
           if (k == 0) physical = tag;
         }
-        vertices.resize(static_cast<std::size_t>(vertices_of_type(type)));
+        vertices.resize(static_cast<std::size_t>(gmsh_element(type).nodes));
         for (std::int64_t& vertex : vertices) vertex = cursor_.integer();
         add_element(type, vertices, physical);
       }
@@ -239,7 +242,7 @@ class Reader {
       const int type = cursor_.integer();
       const std::int64_t count = cursor_.checked(cursor_.size());
       const auto physical = physical_of_volume_.find(entity);
-      vertices.resize(static_cast<std::size_t>(vertices_of_type(type)));
+      vertices.resize(static_cast<std::size_t>(gmsh_element(type).nodes));
       for (std::int64_t i = 0; i < count; ++i) {
         cursor_.size();  // element tag
         for (std::int64_t& vertex : vertices) vertex = cursor_.size();
@@ -261,14 +264,18 @@ class Reader {
     coordinates_.insert(coordinates_.end(), {x, y, z});
   }
 
-  // Takes over the element's vertices if it is a tetrahedron or a triangle.
+  // Takes over the vertices of a tetrahedron, and of a triangle that belongs to a group.
   void add_element(std::int64_t type, const std::vector<std::int64_t>& tags, int physical) {
-    if (type == kTetrahedron) {
+    if (type == kGmshTetrahedron) {
       tets_.insert(tets_.end(), tags.begin(), tags.end());
       labels_.push_back(physical);
-    } else if (type == kTriangle && physical != 0) {
+    } else if (type == kGmshTriangle) {
+      if (physical == 0) return;
       triangles_.insert(triangles_.end(), tags.begin(), tags.end());
       triangle_labels_.push_back(physical);
+    } else if (const ElementKind& kind = gmsh_element(type);
+               kind.dimension == 3 || (kind.dimension == 2 && physical != 0)) {
+      others_.add(kind, type);
     }
   }
 
@@ -288,7 +295,7 @@ class Reader {
   }
 
   GroupedMesh mesh() const {
-    if (tets_.empty()) refuse_format("has no 4-node tetrahedron");
+    others_.check(static_cast<std::int64_t>(tets_.size() / 4));
     GroupedMesh result;
     TetMesh& mesh = result.mesh;
     mesh.nodes = as_columns<3>(coordinates_);
@@ -311,6 +318,7 @@ class Reader {
   std::map<int, std::vector<int>> physicals_of_surface_;
   std::map<std::string, int> volume_names_, surface_names_;
   std::unordered_map<std::int64_t, int> index_of_tag_;
+  OtherElements others_;
   std::vector<double> coordinates_;
   std::vector<std::int64_t> tets_;  // tags
   std::vector<int> labels_;

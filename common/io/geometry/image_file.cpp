@@ -187,6 +187,12 @@ double largest_content(const fs::path& path) {
 Status check_nifti_header(const fs::path& path) {
   const std::unique_ptr<char, Free> header_file(nifti_findhdrname(path.c_str()));
   const auto header = header_file ? parse(first_bytes(header_file.get())) : std::nullopt;
+  if (!header && nifti_is_gzfile(path.c_str()) == 0) {
+    const Result<std::string> bytes = read_file(path);
+    if (bytes && bytes->starts_with("\x1F\x8B")) {
+      return unreadable(path, "is compressed by gzip: its name must end in .nii.gz");
+    }
+  }
   if (!header) return unreadable(path, "is not a NIfTI image");
   for (const auto check : {check_dimensions, check_datatype, check_offset}) {
     if (const std::string problem = check(*header); !problem.empty()) {
@@ -207,6 +213,52 @@ struct FreeImage {
   void operator()(nifti_image* image) const { nifti_image_free(image); }
 };
 using ImageHandle = std::unique_ptr<nifti_image, FreeImage>;
+
+// Where the sform contradicts the rest of the header, or nothing. An sform of another code may lie
+// in another space than the qform, but a voxel has one size.
+std::string contradiction(const nifti_image& image) {
+  const double pixdim[] = {image.dx, image.dy, image.dz};
+  const auto entry = [](const nifti_dmat44& m, int row, int column) { return m.m[row][column]; };
+  double steps[3] = {}, apart_mm = 0.0;
+  for (int axis = 0; axis < 3; ++axis) {
+    for (int row = 0; row < 3; ++row) {
+      steps[axis] = std::hypot(steps[axis], entry(image.sto_xyz, row, axis));
+    }
+  }
+  for (int axis = 0; axis < 3; ++axis) {
+    // NaN: the check of the matrix names it. 0: the header does not say.
+    const double size = std::abs(pixdim[axis]);
+    if (size > 0.0 && std::abs(steps[axis] - size) > kLargestStepError * size) {
+      return fmt::format(
+          "contradicts itself: its sform has steps of {:.4g} x {:.4g} x {:.4g} mm, its pixdim of "
+          "{:.4g} x {:.4g} x {:.4g}; resave it with the right ones",
+          steps[0], steps[1], steps[2], pixdim[0], pixdim[1], pixdim[2]);
+    }
+  }
+  // Atlases often have a qform that nobody filled in; of them the sform counts, as in the standard.
+  const bool both =
+      image.sform_code == NIFTI_XFORM_SCANNER_ANAT && image.qform_code == NIFTI_XFORM_SCANNER_ANAT;
+  if (!both) return {};
+  for (int corner = 0; corner < 8; ++corner) {
+    double squares = 0.0;
+    for (int row = 0; row < 3; ++row) {
+      double d = entry(image.sto_xyz, row, 3) - entry(image.qto_xyz, row, 3);
+      for (int axis = 0; axis < 3; ++axis) {
+        const double index =
+            ((corner >> axis) & 1) != 0 ? static_cast<double>(image.dim[axis + 1] - 1) : 0.0;
+        d += index * (entry(image.sto_xyz, row, axis) - entry(image.qto_xyz, row, axis));
+      }
+      squares += d * d;
+    }
+    apart_mm = std::max(apart_mm, std::sqrt(squares));
+  }
+  if (apart_mm <= 0.5 * *std::min_element(steps, steps + 3)) return {};
+  return fmt::format(
+      "contradicts itself: its sform and its qform, both of the scanner's space (code 1), put a "
+      "voxel "
+      "{:.3g} mm apart; resave it with one of them",
+      apart_mm);
+}
 
 // The sform when there is one, else the qform; NIfTI-1 "method 3" before "method 2".
 Result<AffineTransform> affine_of(const nifti_image& image, const fs::path& path) {
@@ -232,6 +284,11 @@ Result<AffineTransform> affine_of(const nifti_image& image, const fs::path& path
   const double volume = affine.linear().colwise().norm().prod();
   if (!(std::abs(affine.linear().determinant()) > 1e-6 * volume)) {
     return unreadable(path, name + " is singular");
+  }
+  if (use_sform) {
+    if (const std::string problem = contradiction(image); !problem.empty()) {
+      return unreadable(path, problem);
+    }
   }
   return affine;
 }

@@ -9,6 +9,7 @@
 #include <cstdint>
 #include <map>
 #include <optional>
+#include <sstream>
 #include <vector>
 
 #include "common/io/files/binary_codec.hpp"
@@ -65,12 +66,12 @@ Result<ValueType> value_type(const std::string& name) {
 
 // Signs that take the file's space to RAS.
 Result<Vec3> signs_to_ras(const NrrdHeader& header) {
-  const std::string space = header.field("space");
-  if (space == "left-posterior-superior" || space == "LPS") return Vec3(-1, -1, 1);
-  if (space == "right-anterior-superior" || space == "RAS") return Vec3(1, 1, 1);
-  if (space == "left-anterior-superior" || space == "LAS") return Vec3(-1, 1, 1);
+  const std::string space = header.word("space");
+  if (space == "left-posterior-superior" || space == "lps") return Vec3(-1, -1, 1);
+  if (space == "right-anterior-superior" || space == "ras") return Vec3(1, 1, 1);
+  if (space == "left-anterior-superior" || space == "las") return Vec3(-1, 1, 1);
   if (space.empty()) return unreadable("space is missing, so its place is unknown");
-  return unreadable("space = " + space +
+  return unreadable("space = " + header.field("space") +
                     ": must be left-posterior-superior, right-anterior-superior or "
                     "left-anterior-superior");
 }
@@ -79,7 +80,7 @@ Result<Vec3> signs_to_ras(const NrrdHeader& header) {
 bool take_vector(std::string_view& rest, std::optional<Vec3>& vector) {
   vector.reset();
   rest = trimmed(rest);
-  if (rest.starts_with("none")) {
+  if (lower_case(rest.substr(0, 4)) == "none") {
     rest.remove_prefix(4);
     return true;
   }
@@ -104,6 +105,23 @@ Status check_units(const NrrdHeader& header) {
       return unreadable("space units = " + units + ": must be mm");
     }
     at = end;
+  }
+  return {};
+}
+
+// A header has spacings or directions. One that has both must not contradict itself.
+Status check_spacings(const NrrdHeader& header, const Axes& axes, const Mat3& directions) {
+  std::istringstream spacings(header.field("spacings"));
+  std::string word;
+  for (std::size_t axis = 0; spacings >> word; ++axis) {
+    double spacing = 0.0;
+    if (!parse_number(word, spacing)) continue;  // nan: of an axis that is no space
+    for (std::size_t i = 0; i < 3; ++i) {
+      const double step = directions.col(static_cast<Eigen::Index>(i)).norm();
+      if (axes.space[i] != axis || std::abs(spacing - step) <= kLargestStepError * step) continue;
+      return unreadable(fmt::format("spacings = {}: axis {} has steps of {:g} by its direction",
+                                    header.field("spacings"), axis, step));
+    }
   }
   return {};
 }
@@ -139,6 +157,9 @@ Result<Axes> read_space(const NrrdHeader& header, VoxelImage& image) {
   }
   std::optional<Vec3> origin;
   std::string_view origin_text = where;
+  if (Status ok = check_spacings(header, axes, image.T_ras_voxel.linear()); !ok) {
+    return tl::unexpected(ok.error());
+  }
   if (spatial != 3 || !trimmed(rest).empty()) {
     return unreadable(fmt::format("space directions = {}: does not agree with {} sizes", text,
                                   header.sizes.size()));
@@ -185,7 +206,9 @@ Result<std::vector<Segment>> read_segments(const NrrdHeader& header, const Axes&
   for (int i = 0; i < kMaxSegments; ++i) {
     const std::string prefix = fmt::format("Segment{}_", i);
     const auto first = header.fields.lower_bound(prefix);
-    if (first == header.fields.end() || !first->first.starts_with(prefix)) break;
+    const bool there = first != header.fields.end() &&
+                       !BeforeByLetters{}(first->first.substr(0, prefix.size()), prefix);
+    if (!there || BeforeByLetters{}(prefix, first->first.substr(0, prefix.size()))) break;
     const auto label = whole_number(header, prefix + "LabelValue", 1);
     if (!label) return tl::unexpected(label.error());
     const auto layer = whole_number(header, prefix + "Layer", axes.list ? i : 0);
@@ -279,6 +302,13 @@ Result<VoxelImage> parse_nrrd(const std::string& content, const LabelChoice& cho
   if (*segment) {
     const auto wanted = static_cast<float>((*segment)->label);
     const auto marked = static_cast<float>(choice.label);
+    for (const float value : image.values) {
+      if (value == std::round(value)) continue;
+      return unreadable(fmt::format(
+          "segment \"{}\": a voxel has the value {:.4g}, which is no label: resample by nearest "
+          "neighbour",
+          (*segment)->name, value));
+    }
     for (float& value : image.values) value = value == wanted ? marked : 0.0F;
   }
   return image;
@@ -287,7 +317,8 @@ Result<VoxelImage> parse_nrrd(const std::string& content, const LabelChoice& cho
 }  // namespace
 
 Result<VoxelImage> read_label_map(const fs::path& path, const LabelChoice& choice) {
-  if (path.extension() != ".nrrd") {
+  const std::string extension = lower_extension(path);
+  if (extension != ".nrrd" && extension != ".nhdr") {
     if (choice.segment.empty()) return read_nifti(path);
     return invalid_file(path, "names no segments: only a .seg.nrrd file does");
   }

@@ -18,8 +18,8 @@ namespace brainshift::io {
 Result<GroupedMesh> parse_gmsh(const std::string& content);
 
 // VTK's XML container (.vtu, .vtp): ascii, binary (base64) and appended (raw or base64) arrays;
-// zlib-compressed or not; header_type UInt32 or UInt64; either byte order. Messages name the array.
-// Source: VTK user's guide, "VTK XML file formats". All keep unreferenced nodes.
+// zlib-compressed or not; header_type UInt32 or UInt64; either byte order. Messages name the
+// array. Source: VTK user's guide, "VTK XML file formats". All keep unreferenced nodes.
 Result<MeshWithFields> parse_vtu(std::string content);
 // Tetrahedra and triangles; labels are numbers, a VTU names nothing.
 Result<GroupedMesh> parse_grouped_vtu(std::string content);
@@ -36,8 +36,9 @@ Result<TriangleSurface> parse_ply(const std::string& content);
 // skipped. Messages name the line.
 Result<TriangleSurface> parse_obj(const std::string& content);
 // Points in plain text, without triangles: x, y, z at the start of each line, numbers between
-// blanks, tabs, commas or semicolons. A first line of words is a heading; empty lines and those
-// that begin with '#' or "//" are skipped. Messages name line or point.
+// blanks, tabs, commas or semicolons. A first line of words is a heading, which must name the
+// columns (files/table.hpp); empty lines and those that begin with '#' or "//" are skipped, but
+// for such a heading and for SPACE=LPS in them. Messages name the line.
 Result<TriangleSurface> parse_xyz(const std::string& content);
 
 // Numbers of a list, one column after the other.

@@ -4,16 +4,22 @@
 #include <fmt/format.h>
 
 #include <array>
+#include <cctype>
 #include <charconv>
 #include <cmath>
 #include <cstdint>
 #include <limits>
 #include <map>
+#include <optional>
 #include <sstream>
+#include <utility>
 
 #include "common/io/files/binary_codec.hpp"
+#include "common/io/files/csv_numbers.hpp"
+#include "common/io/files/nrrd_header.hpp"
 #include "common/io/files/number_cursor.hpp"
 #include "common/io/files/point_space.hpp"
+#include "common/io/files/table.hpp"
 #include "common/io/geometry/mesh_formats.hpp"
 
 namespace brainshift::io {
@@ -84,7 +90,9 @@ TriangleSurface read_stl_ascii(std::string_view text) {
   CornerMerger builder;
   std::size_t loops = 0;
   bool ended = false;
-  for (std::string_view word = next_word(text); !word.empty(); word = next_word(text)) {
+  // Keywords in any case: some programs write them in capitals.
+  for (std::string word = lower_case(next_word(text)); !word.empty();
+       word = lower_case(next_word(text))) {
     if (word == "endsolid") ended = true;
     if (word == "endloop" && builder.corners() != 3 * ++loops) {
       refuse_format(fmt::format("facet {} does not have three vertices", loops - 1));
@@ -118,7 +126,7 @@ TriangleSurface read_stl(const std::string& content) {
       return as_ras(read_stl_binary(content, triangles), text.substr(0, 80));
     }
   }
-  if (content.rfind("solid", 0) == 0) {
+  if (lower_case(text.substr(0, 5)) == "solid") {
     return as_ras(read_stl_ascii(content), text.substr(0, text.find('\n')));
   }
   refuse_format("is neither an ASCII STL nor a binary one of the promised size");
@@ -332,46 +340,111 @@ std::string_view take_numbers(std::string_view line, std::vector<double>& row) {
   return {};
 }
 
-// Without a first line of words, as spreadsheets and scanners put it.
-std::string without_heading(const std::string& content) {
-  const std::size_t first = content.find_first_not_of(" \t\r\n");
-  const bool letter = first != std::string::npos && ((content[first] | 0x20) >= 'a') &&
-                      ((content[first] | 0x20) <= 'z');
-  if (!letter || content.compare(first, 3, "nan") == 0 || content.compare(first, 3, "inf") == 0)
-    return content;
-  std::string commented = "#";
-  return commented.append(content, first);
-}
-
-// One row per line. "nan" and "inf" are numbers here: the caller's check of the points names them.
-std::vector<std::vector<double>> number_rows(const std::string& text) {
-  std::vector<std::vector<double>> rows;
-  std::string_view rest = text;
-  for (int number = 1; !rest.empty(); ++number) {
-    const std::string_view line = rest.substr(0, rest.find('\n'));
-    rest.remove_prefix(std::min(rest.size(), line.size() + 1));
-    const std::size_t first = line.find_first_not_of(kBetween);
-    if (first == std::string_view::npos || line[first] == '#' || line.substr(first, 2) == "//") {
-      continue;
-    }
-    rows.emplace_back();
-    const std::string_view wrong = take_numbers(line, rows.back());
-    if (wrong.empty()) continue;
-    refuse_format(fmt::format("line {}: \"{}\" is no number", number, wrong));
+// A heading's cells and those of the rows below it: between commas where it has any, else between
+// blanks, tabs or semicolons.
+Cells cells_below(std::string_view line, bool commas) {
+  if (commas) return quoted_cells_of(line);
+  Cells cells;
+  for (std::size_t at = line.find_first_not_of(kBetween); at != std::string_view::npos;
+       at = line.find_first_not_of(kBetween)) {
+    line.remove_prefix(at);
+    cells.emplace_back(line.substr(0, line.find_first_of(kBetween)));
+    line.remove_prefix(cells.back().size());
   }
-  return rows;
+  return cells;
 }
 
+// What the columns of a file are. A heading must name the coordinates; without one they are the
+// first three. The comment in front of the points counts where it has as many words as they have
+// numbers and names the coordinates (CloudCompare writes "//X Y Z").
+class XyzColumns {
+ public:
+  // Takes one line that is not empty: a heading, a comment or a point.
+  void take(std::string_view whole, std::vector<double>& coordinates) {
+    std::string_view line = whole;
+    line.remove_prefix(line.find_first_not_of(kBetween));
+    const std::size_t words = line.find_first_not_of("#/ \t");
+    if (line.front() == '#' || line.substr(0, 2) == "//") {
+      if (const PointSpace said = value_of(point_space_in(line)); said != PointSpace::kUnsaid) {
+        space_ = said;
+      }
+      if (first_ && words != std::string_view::npos) comment_ = line.substr(words);
+      return;
+    }
+    const bool letter = std::isalpha(static_cast<unsigned char>(line.front())) != 0 &&
+                        line.substr(0, 3) != "nan" && line.substr(0, 3) != "inf";
+    const bool first = std::exchange(first_, false);
+    if (first && letter && !has_number(quoted_cells_of(line))) {
+      if (obey(whole)) return;
+      refuse_format(fmt::format("the heading \"{}\" must name columns x,y,z or r,a,s or l,p,s",
+                                trimmed(line).substr(0, 60)));
+    }
+    if (const bool commas = comment_.find(',') != std::string_view::npos;
+        first && cells_below(comment_, commas).size() == cells_below(whole, commas).size()) {
+      obey(comment_);
+    }
+    const std::size_t number = coordinates.size() / 3;
+    if (heading_) {
+      const Cells cells = cells_below(whole, commas_);  // the first cell may be empty
+      if (!value_of(heading_->placed(cells))) return;
+      const auto point = columns_.of(cells);
+      if (!point) {
+        refuse_format(
+            fmt::format("point {}: \"{}\" must have three finite numbers below the heading", number,
+                        trimmed(line).substr(0, 60)));
+      }
+      coordinates.insert(coordinates.end(), point->begin(), point->end());
+      return;
+    }
+    row_.clear();
+    if (const auto wrong = take_numbers(line, row_); !wrong.empty()) {
+      refuse_format(fmt::format("\"{}\" is no number", wrong));
+    }
+    if (row_.size() < 3) {
+      refuse_format(fmt::format("point {} has {} coordinates: must have 3", number, row_.size()));
+    }
+    coordinates.insert(coordinates.end(), row_.begin(), row_.begin() + 3);
+  }
+  PointSpace space() const { return space_; }
+
+ private:
+  bool obey(std::string_view line) {
+    const bool commas = line.find(',') != std::string_view::npos;
+    Heading heading(cells_below(line, commas));
+    const auto named = heading.place();
+    if (!named) return false;
+    heading_ = std::move(heading), columns_ = *named, commas_ = commas;
+    return true;
+  }
+
+  bool first_ = true, commas_ = false;
+  std::optional<Heading> heading_;
+  PlaceColumns columns_;
+  PointSpace space_ = PointSpace::kUnsaid;
+  std::string_view comment_;  // the last one in front of the points
+  std::vector<double> row_;
+};
+
+// "nan" and "inf" are numbers here: the caller's check of the points names them.
 TriangleSurface read_xyz(const std::string& content) {
-  const auto rows = number_rows(without_heading(content));
-  TriangleSurface surface;
-  surface.vertices.resize(3, static_cast<Eigen::Index>(rows.size()));
-  for (std::size_t i = 0; i < rows.size(); ++i) {
-    if (rows[i].size() < 3) {
-      refuse_format(fmt::format("point {} has {} coordinates: must have 3", i, rows[i].size()));
+  XyzColumns columns;
+  std::vector<double> coordinates;
+  std::string_view rest = content;
+  int number = 0;
+  try {
+    while (!rest.empty()) {
+      ++number;
+      const std::string_view line = take_line(rest);
+      if (line.find_first_not_of(kBetween) != std::string_view::npos) {
+        columns.take(line, coordinates);
+      }
     }
-    surface.vertices.col(static_cast<Eigen::Index>(i)) << rows[i][0], rows[i][1], rows[i][2];
+  } catch (const FormatProblem& problem) {
+    refuse_format(fmt::format("line {}: {}", number, problem.message));
   }
+  TriangleSurface surface;
+  surface.vertices = as_columns<3>(coordinates);
+  turn_to_ras(columns.space(), surface.vertices);
   return surface;
 }
 

@@ -13,13 +13,12 @@
 #include "common/io/files/binary_codec.hpp"
 #include "common/io/files/number_cursor.hpp"
 #include "common/io/files/point_space.hpp"
+#include "common/io/geometry/element_table.hpp"
 #include "common/io/geometry/mesh_formats.hpp"
 
 namespace brainshift::io {
 namespace {
 
-constexpr std::int64_t kVtkTetra = 10;
-constexpr std::int64_t kVtkTriangle = 5;
 // deflate cannot do better than about 1032:1; a header that promises more lies.
 constexpr std::size_t kLargestBlockExpansion = 1040;
 
@@ -364,19 +363,27 @@ GroupedMesh read_grouped(const VtkXmlFile& file) {
   const std::vector<std::int64_t> labels = read_labels(file, count);
 
   std::vector<int> tets, triangles;
+  OtherElements others;
   for (std::size_t cell = 0; cell < types.integers.size(); ++cell) {
-    const bool tetra = types.integers[cell] == kVtkTetra;
-    if (!tetra && (types.integers[cell] != kVtkTriangle || labels.empty())) continue;
+    const std::int64_t type = types.integers[cell];
+    const bool tetra = type == kVtkTetrahedron;
+    const bool labelled = !labels.empty();
+    const ElementKind& kind = vtk_element(type);
+    if (!tetra && !(type == kVtkTriangle && labelled)) {
+      const bool lost = kind.dimension == 3 || (kind.dimension == 2 && labelled);
+      if (lost) others.add(kind, type);
+      continue;
+    }
     const int vertices = tetra ? 4 : 3;
     if (cells.size(cell) != vertices) {
       refuse_format(fmt::format("cell {} is a {} with {} vertices: must have {}", cell,
                                 tetra ? "tetrahedron" : "triangle", cells.size(cell), vertices));
     }
     for (int k = 0; k < vertices; ++k) (tetra ? tets : triangles).push_back(cells.vertex(cell, k));
-    if (labels.empty()) continue;
+    if (!labelled) continue;
     (tetra ? mesh.labels : result.triangle_labels).push_back(static_cast<int>(labels[cell]));
   }
-  if (tets.empty()) refuse_format("has no tetrahedron");
+  others.check(static_cast<std::int64_t>(tets.size() / 4));
   mesh.tets = as_columns<4>(tets);
   result.triangles = as_columns<3>(triangles);
   return result;

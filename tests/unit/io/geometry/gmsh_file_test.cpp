@@ -246,6 +246,21 @@ TEST_F(GmshFile, BadFilesAreRefusedByWhatIsWrong) {
        {"<VTKFile>", "not a Gmsh file"}});
 }
 
+TEST_F(GmshFile, ElementsThatWouldGetLostAreNamedWithTheirCount) {
+  const auto read = [this](const std::string& content) {
+    return read_tet_mesh(folder_.write("m.msh", content));
+  };
+  const std::string tet = "1 4 2 0 1 1 2 3 4\n";
+  expect_refused(read, {{ascii(kFour, "3\n" + tet +
+                                          "2 11 2 0 1 1 2 3 4 1 2 3 4 1 2\n"
+                                          "3 11 2 0 1 1 2 3 4 1 2 3 4 1 2"),
+                         "has 2 10-node tetrahedra (type 11) beside 1 4-node tetrahedra"},
+                        {ascii(kFour, "2\n" + tet + "2 3 2 7 1 1 2 3 4"),
+                         "1 4-node quadrilaterals (type 3)"}});
+  // Points, lines, and faces that belong to no group are nobody's.
+  EXPECT_TRUE(read(ascii(kFour, "4\n" + tet + "2 15 2 7 1 1\n3 1 2 7 1 1 2\n4 3 2 0 1 1 2 3 4")));
+}
+
 TEST_F(GmshFile, UnknownExtensionAndMissingFileAreNamed) {
   EXPECT_THAT(refusal_of(read_tet_mesh(folder_.write("m.xyz", ""))),
               HasSubstr("unknown mesh format '.xyz'"));
@@ -316,6 +331,35 @@ $Elements
 3 1 2 3 4
 $EndElements
 )";
+
+// The mesh of kGmsh4 in two parts: the faces between them have their volume's group.
+TEST(GroupedMesh, PartsOfEntitiesKeepTheGroupsOfTheirKind) {
+  std::string parts = kGmsh4;
+  const std::string end = "$EndEntities\n";
+  parts.insert(parts.find(end) + end.size(),
+               "$PartitionedEntities\n2\n1\n7 1\n0 0 2 1\n"
+               "11 2 1 1 1 0 0 0 1 1 1 1 5 0\n"
+               "12 3 1 2 1 2 0 0 0 1 1 1 1 3 0\n"
+               "21 3 1 1 2 0 0 0 1 1 1 1 3 1 12\n$EndPartitionedEntities\n");
+  const auto renamed = [&](const std::string& from, const std::string& to) {
+    parts.replace(parts.find(from), from.size(), to);
+  };
+  renamed("2 1 2 1\n1 2 3 4", "2 11 2 1\n1 2 3 4");
+  renamed("2 2 2 1\n2 1 2 3", "2 12 2 1\n2 1 2 3");
+  renamed("3 1 4 1\n3 1 2 3 4", "3 21 4 1\n3 1 2 3 4");
+  const TemporaryFolder folder;
+  const auto mesh = value_or_fail(read_grouped_mesh(folder.write("m.msh", parts)));
+  EXPECT_THAT(mesh.mesh.labels, ElementsAre(3));
+  EXPECT_THAT(mesh.triangle_labels, ElementsAre(5));
+}
+
+TEST(GroupedMesh, ATriangleThatAGroupHasTwiceCountsOnce) {
+  std::string twice = kGmsh2;
+  twice.replace(twice.find("4 2 2 5 5 1 2 9"), 15, "4 2 2 5 5 3 4 2");
+  const TemporaryFolder folder;
+  EXPECT_THAT(value_or_fail(read_grouped_mesh(folder.write("m.msh", twice))).triangle_labels,
+              ElementsAre(5, 6));
+}
 
 TEST(GroupedMesh, GmshTwoGivesNamesAndTrianglesOfKeptNodes) {
   const TemporaryFolder folder;

@@ -64,6 +64,9 @@ class Header {
   Header& sform(std::array<float, 12> rows, std::int16_t code = 1) {
     set<std::int16_t>(254, code);
     for (std::size_t i = 0; i < 12; ++i) set<float>(280 + 4 * i, rows[i]);
+    for (std::size_t i = 0; i < 3 && code > 0; ++i) {
+      set<float>(80 + 4 * i, std::hypot(rows[i], rows[i + 4], rows[i + 8]));  // pixdim
+    }
     return *this;
   }
   Header& qform(std::array<float, 3> quaternion, std::array<float, 3> offset,
@@ -160,9 +163,29 @@ TEST_F(ImageFile, ObliqueSformIsTakenAsItIs) {
 TEST_F(ImageFile, SformHasPrecedenceOverQform) {
   const Header header = Header()
                             .qform({0, 0, 0}, {100, 100, 100}, {1, 1, 1, 1})
-                            .sform({1, 0, 0, 7, 0, 1, 0, 8, 0, 0, 1, 9});
+                            .sform({1, 0, 0, 7, 0, 1, 0, 8, 0, 0, 1, 9}, 2);
   const auto image = value_or_fail(read(header, voxels<float>(24)));
   EXPECT_TRUE(image.T_ras_voxel.translation().isApprox(Vec3(7, 8, 9)));
+}
+
+TEST_F(ImageFile, AHeaderThatContradictsItselfIsRefused) {
+  const std::array<float, 12> unit = {1, 0, 0, 7, 0, 1, 0, 8, 0, 0, 1, 9};
+  EXPECT_THAT(refusal(Header().sform(unit).set<float>(84, 2.0F), voxels<float>(24)),
+              testing::AllOf(HasSubstr("sform has steps of 1 x 1 x 1 mm"),
+                             HasSubstr("pixdim of 1 x 2 x 1")));
+  EXPECT_TRUE(read(Header().sform(unit).set<float>(84, 1.005F), voxels<float>(24)));
+  const auto both = [&](float x) {
+    return Header().qform({0, 0, 0}, {x, 8, 9}, {1, 1, 1, 1}).sform(unit);
+  };
+  EXPECT_TRUE(read(both(7.3F), voxels<float>(24)));
+  EXPECT_THAT(refusal(both(10), voxels<float>(24)),
+              HasSubstr("both of the scanner's space (code 1), put a voxel 3 mm apart"));
+}
+
+TEST_F(ImageFile, GzipUnderAnotherNameIsNamed) {
+  const std::string gzip("\x1F\x8B\x08\0\0\0\0\0\0\0", 10);
+  EXPECT_THAT(refusal_of(read_nifti(folder_.write("a.nii", gzip + std::string(500, 'x')))),
+              HasSubstr("compressed by gzip: its name must end in .nii.gz"));
 }
 
 TEST_F(ImageFile, QformAloneGivesTheRotationOfItsQuaternion) {
@@ -290,7 +313,8 @@ TEST_F(ImageFile, Nifti2IsRead) {
   for (std::size_t i = 0; i < 8; ++i) set(16 + 8 * i, dims[i]);
   for (std::size_t i = 0; i < 8; ++i) set(104 + 8 * i, 1.0);  // pixdim
   set(168, std::int64_t{544});                                // vox_offset
-  set(348, std::int32_t{1});                                  // sform_code
+  set(112, 2.0);
+  set(348, std::int32_t{1});  // sform_code
   const double rows[12] = {2, 0, 0, -90, 0, 1, 0, -125, 0, 0, 1, -71};
   for (std::size_t i = 0; i < 12; ++i) set(400 + 8 * i, rows[i]);
   set(500, std::int32_t{2});  // mm

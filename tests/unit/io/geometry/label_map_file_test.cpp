@@ -109,6 +109,29 @@ TEST(LabelMapFile, ReadsEveryTypeEncodingAndByteOrder) {
   }
 }
 
+TEST(LabelMapFile, NeitherCaseNorBlanksOfFieldsCount) {
+  const auto image = value_or_fail(
+      read("NRRD0004\nType: Unsigned Char\nDimension: 4\nSizes: 1 2 1 1\nEncoding: RAW\n"
+           "Space: Left-Posterior-Superior\nSpaceDirections: None (2,0,0) (0,1,0) (0,0,1)\n"
+           "Space Origin: (1,2,3)\nsegment0_labelvalue:=4\n\n\x04\x05",
+           {"", 9}, "map.NRRD"));
+  EXPECT_THAT(image.values, ElementsAre(9, 0));
+  EXPECT_EQ(image.T_ras_voxel * Vec3(1, 0, 0), Vec3(-3, -2, 3));
+}
+
+TEST(LabelMapFile, RefusesWhatItWouldHaveToGuess) {
+  expect_refused(reading(),
+                 {{nrrd("uchar", counted<std::uint8_t>(), kSpace, "data file: map.raw.gz\n"),
+                   "its pixels lie elsewhere (a detached header)"},
+                  {nrrd("uchar", counted<std::uint8_t>(), kSpace, "spacings: 7 nan 1\n"),
+                   "spacings = 7 nan 1: axis 0 has steps of"}});
+  std::string half = counted<float>();
+  const float fraction = 2.5F;
+  std::memcpy(half.data() + 8, &fraction, sizeof fraction);
+  expect_refused(reading(), {{nrrd("float", half, kSpace, "Segment0_LabelValue:=4\n"),
+                              "a voxel has the value 2.5, which is no label"}});
+}
+
 TEST(LabelMapFile, EverySpaceBecomesRas) {
   for (const auto& [name, signs] :
        {std::pair{"left-posterior-superior", Vec3(-1, -1, 1)}, std::pair{"LPS", Vec3(-1, -1, 1)},

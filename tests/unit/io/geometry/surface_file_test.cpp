@@ -2,6 +2,7 @@
 // Surfaces in .stl, .ply and .obj and points as text; .vtp is in vtk_file_test.cpp.
 #include <gmock/gmock.h>
 
+#include <cctype>
 #include <cstdint>
 #include <limits>
 #include <sstream>
@@ -168,6 +169,25 @@ class BadSurface : public testing::Test {
   TemporaryFolder folder_;
 };
 
+TEST(SurfaceFile, StlKeywordsCountInAnyCase) {
+  std::string capitals = stl_ascii();
+  for (char& c : capitals) c = static_cast<char>(std::toupper(static_cast<unsigned char>(c)));
+  const TemporaryFolder folder;
+  const auto surface = value_or_fail(read_surface(folder.write("s.stl", capitals)));
+  const auto same = value_or_fail(read_surface(folder.write("t.stl", stl_ascii())));
+  EXPECT_EQ(surface.vertices, same.vertices);
+  EXPECT_EQ(surface.triangles, same.triangles);
+}
+
+TEST(SurfaceFile, VerticesWithoutATriangleAreDropped) {
+  const TemporaryFolder folder;
+  const auto surface = value_or_fail(read_surface(
+      folder.write("s.obj", "v 9 9 9\nv 0 0 0\nv 1 0 0\nv 500 0 0\nv 0 1 0\nf 2 3 5\n")));
+  ASSERT_EQ(surface.num_vertices(), 3);
+  EXPECT_EQ(surface.vertices.col(2), Vec3(0, 1, 0));
+  EXPECT_EQ(surface.triangles.col(0), Eigen::Vector3i(0, 1, 2));
+}
+
 TEST_F(BadSurface, StlProblemsAreNamed) {
   const auto read = reading("s.stl");
   expect_edits_refused(read, stl_ascii(),
@@ -286,6 +306,27 @@ TEST_F(SurfacePoints, TextGivesPointsWithoutTriangles) {
   }
 }
 
+TEST_F(SurfacePoints, AHeadingIsObeyedAndNotSkipped) {
+  for (const char* text : {"l,p,s\n-1,-2,3\n4.5,-5,6\n", "//L P S\n-1 -2 3\n4.5 -5 6\n",
+                           "Label;z;x;y\na;3;1;2\nb;6;-4.5;5\n",
+                           "label,r,a,s,defined\n,1,2,3,1\nlost,0,0,0,0\nb,-4.5,5,6,1\n",
+                           "# SPACE=LPS\n-1 -2 3\n4.5 -5 6\n"}) {
+    const auto points = value_or_fail(read_surface_or_points(folder_.write("p.csv", text)));
+    ASSERT_EQ(points.num_vertices(), 2) << text;
+    EXPECT_EQ(points.vertices.col(0), Vec3(1, 2, 3)) << text;
+    EXPECT_EQ(points.vertices.col(1), Vec3(-4.5, 5, 6)) << text;
+  }
+  const auto prose = value_or_fail(read_surface_or_points(
+      folder_.write("p.xyz", "# traced by hand, z up, y and x as usual\n1 2 3\n")));
+  EXPECT_EQ(prose.vertices.col(0), Vec3(1, 2, 3));
+  const auto read = [this](const std::string& text) {
+    return read_surface_or_points(folder_.write("p.csv", text));
+  };
+  expect_refused(read, {{"i,j,k\n1,2,3\n", "line 1: the heading \"i,j,k\" must name columns"},
+                        {"x_m,y_m,z_m\n1,2,3\n", "must name columns"},
+                        {"x,y,z\n1,2\n", "line 2: point 0: \"1,2\" must have three"}});
+}
+
 TEST_F(SurfacePoints, APlyWithoutFacesGivesPointsHereAndIsRefusedAsASurface) {
   const auto path = folder_.write("p.ply",
                                   "ply\nformat ascii 1.0\nelement vertex 2\nproperty float x\n"
@@ -300,7 +341,7 @@ TEST_F(SurfacePoints, BadTextsAreRefused) {
   const auto read = [this](const std::string& text) {
     return read_surface_or_points(folder_.write("p.xyz", text));
   };
-  expect_refused(read, {{"1 2 3\n4 5\n", "p.xyz: point 1 has 2 coordinates: must have 3"},
+  expect_refused(read, {{"1 2 3\n4 5\n", "p.xyz: line 2: point 1 has 2 coordinates: must have 3"},
                         {"1 2 3\n# ok\n4 5x 6\n", "line 3: \"5x\" is no number"},
                         {"1 2 nan\n", "node 0 has a coordinate that is not finite"},
                         {"nan 2 3\n", "not finite"},

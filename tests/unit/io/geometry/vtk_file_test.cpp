@@ -295,7 +295,7 @@ TEST_F(VtuFile, MissingOrUnknownPartsAreNamed) {
        {"0\n 1\n 2\n 3\n 0\n 1\n 4\n", "0\n 1,5\n 2\n 3\n 0\n 1\n 4\n", "not a number"},
        {"<VTKFile", "<Other", "is not well-formed XML"},
        // Hexahedra alone.
-       {"10\n 5\n 10\n", "12\n 5\n 12\n", "has no tetrahedron"}});
+       {"10\n 5\n 10\n", "12\n 5\n 12\n", "has no 4-node tetrahedron, but"}});
 }
 
 TEST_P(VtuEncoding, PointsAndVectorsInLpsAreTurnedIntoRas) {
