@@ -5,6 +5,7 @@
 
 #include <Eigen/LU>
 #include <algorithm>
+#include <tuple>
 
 #include "common/tracking/transform_graph.hpp"
 
@@ -33,6 +34,26 @@ Status check_options(const ChainOptions& options) {
   return check("max extrapolation", options.time.max_extrapolation_s, 0.0, 1.0);
 }
 
+// Poses can be looked up at another time only if the frames have times of their own. An image that
+// was recorded twice has one time and one pose.
+Status check_clock(const Recording& recording, const ChainOptions& options) {
+  if (options.latency_s == 0.0) return {};
+  for (std::size_t i = 1; i < recording.time_s.size(); ++i) {
+    if (recording.time_s[i] > recording.time_s[i - 1]) continue;
+    const auto moved = [i](const LinkSeries& series) {
+      const auto& [before, now] = std::tie(series.samples[i - 1], series.samples[i]);
+      return before.status == LinkStatus::kOk && now.status == LinkStatus::kOk &&
+             before.T_to_from.matrix() != now.T_to_from.matrix();
+    };
+    if (std::none_of(recording.links.begin(), recording.links.end(), moved)) continue;
+    return invalid(fmt::format(
+        "frames {} and {} have the time {} s and different poses: a latency of {} s cannot be "
+        "taken off; give 0, by which every frame has its own pose",
+        i - 1, i, recording.time_s[i], options.latency_s));
+  }
+  return {};
+}
+
 struct FramePose {
   std::optional<AffineTransform> T;
   std::string why_not;
@@ -51,7 +72,9 @@ FramePose pose_of_frame(const Recording& recording, const std::vector<ConstantLi
       pose = {PoseOutcome::kOk, constants[step.link].T_to_from};
     } else {
       const LinkSeries& series = recording.links[step.link - constants.size()];
-      pose = pose_at(recording.time_s, series.samples, t_s, options.time);
+      pose = options.latency_s == 0.0 && series.samples[at].status != LinkStatus::kMissing
+                 ? own_pose(series.samples[at])
+                 : pose_at(recording.time_s, series.samples, t_s, options.time);
     }
     if (pose.outcome != PoseOutcome::kOk) {
       return {std::nullopt, reason_of(links[step.link], pose.outcome)};
@@ -82,6 +105,7 @@ Result<Chain> evaluate_chain(const Recording& recording, const std::vector<Const
   for (const LinkSeries& series : recording.links) links.push_back(series.frames);
   const auto steps = shortest_chain(links, source, target);
   if (!steps) return tl::unexpected(steps.error());
+  if (Status ok = check_clock(recording, options); !ok) return tl::unexpected(ok.error());
 
   Chain chain;
   for (const ChainStep& step : *steps) chain.links.push_back(links[step.link].name());

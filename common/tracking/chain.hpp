@@ -5,8 +5,9 @@
 //   T_target_source(i) = T_n ... T_2 T_1,  every tracked T_k at the time time_s[i] - latency_s
 //
 // latency_s: by how much an image's stamp is later than the moment it shows. The tracker's clock
-// is the reference. A frame has no transform when its image or any link is not valid at that time;
-// the result says why.
+// is the reference. Without a latency a frame's own sample decides, whatever the times are; only
+// where the frame has none are its neighbours in time asked. A frame has no transform when its
+// image or any link is not valid at that time; the result says why.
 #pragma once
 
 #include <optional>
@@ -45,7 +46,8 @@ struct Chain {
 };
 
 // constants and the recording's links together name the frames; source and target are two of them.
-// kInvalidArgument: no chain (transform_graph.hpp), or an option out of range (named).
+// kInvalidArgument: no chain (transform_graph.hpp), an option out of range (named), or a latency
+// where two frames of one time have different poses.
 Result<Chain> evaluate_chain(const Recording& recording, const std::vector<ConstantLink>& constants,
                              const std::string& source, const std::string& target,
                              const ChainOptions& options = {});

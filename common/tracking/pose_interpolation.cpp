@@ -72,13 +72,15 @@ AffineTransform interpolate(const AffineTransform& A, const AffineTransform& B, 
   return T;
 }
 
+PoseAtTime own_pose(const Link& sample) { return {outcome_of(sample.status), sample.T_to_from}; }
+
 PoseAtTime pose_at(const std::vector<double>& time_s, const std::vector<Link>& samples, double t_s,
                    const PoseTimeOptions& options) {
   const auto near = std::lower_bound(time_s.begin(), time_s.end(), t_s - kSameTime_s);
   for (auto i = static_cast<std::size_t>(near - time_s.begin());
        i < time_s.size() && time_s[i] <= t_s + kSameTime_s; ++i) {
     if (samples[i].status == LinkStatus::kMissing) continue;
-    return {outcome_of(samples[i].status), samples[i].T_to_from};
+    return own_pose(samples[i]);
   }
   const auto bracket = find_bracket(time_s, samples, t_s);
   if (!bracket) return {PoseOutcome::kMissing, {}};

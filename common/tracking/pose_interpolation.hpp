@@ -34,6 +34,9 @@ struct PoseAtTime {
   AffineTransform T_to_from = AffineTransform::Identity();  // when kOk
 };
 
+// What a sample says of its own frame.
+PoseAtTime own_pose(const Link& sample);
+
 // The link at time t_s. time_s: of the frames, s, never decreasing, one per sample.
 // A sample at that very time decides alone. Otherwise the nearest samples before and after it
 // decide; frames without the transform are passed over. Both samples must be valid, since nothing

@@ -128,9 +128,12 @@ void Hub::serve_peers(const std::vector<short>& events) {
     Status status;
     if ((events[i] & kReadable) != 0) {
       Status answered;
-      status = peer.read([&](igtl::Message&& message) {
-        if (answered) answered = answer(peer, std::move(message));
-      });
+      status = peer.read({[&](igtl::Message&& message) {
+                            if (answered) answered = answer(peer, std::move(message));
+                          },
+                          [&](const std::string& sentence) {
+                            tell_(sentence + " (client " + peer.name() + ")");
+                          }});
       if (status) status = answered;
     }
     if (status && peer.wants_to_write()) status = peer.write();
@@ -198,7 +201,9 @@ Status Hub::run(int stop_descriptor) {
     if (upstream_ && polled[3].revents != 0) {
       const bool readable = (polled[3].revents & kReadable) != 0;
       const bool writable = (polled[3].revents & kWritable) != 0;
-      if (const auto news = upstream_->ready(readable, writable, Clock::now(), sink_)) tell_(*news);
+      const Peer::Sinks sinks{
+          sink_, [&](const std::string& sentence) { tell_(sentence + " (from the server)"); }};
+      if (const auto news = upstream_->ready(readable, writable, Clock::now(), sinks)) tell_(*news);
     }
   }
 }

@@ -75,6 +75,10 @@ void InboundWorker::post(igtl::Message&& message) {
   const std::lock_guard lock(mutex_);
   while (!queue_.empty() && queued_bytes_ + bytes > kMaxQueuedBytes) {
     queued_bytes_ -= queue_.front().bytes;
+    igtl::Message& oldest = queue_.front().message;
+    if (std::holds_alternative<igtl::Image>(oldest.content)) {
+      lost_images_.push_back(std::move(oldest.envelope));
+    }
     queue_.pop_front();
     ++dropped_;
   }
@@ -93,15 +97,18 @@ void InboundWorker::run(const std::stop_token& stop) {
   while (!stop.stop_requested()) {
     std::deque<Item> items;
     std::uint64_t dropped = 0;
+    std::vector<igtl::Envelope> lost;
     {
       std::unique_lock lock(mutex_);
       news_.wait_for(lock, stop, kLook, [&] { return !queue_.empty(); });
       items.swap(queue_);
       queued_bytes_ = 0;
       dropped = std::exchange(dropped_, 0);
+      lost.swap(lost_images_);
     }
     if (dropped > 0)
       tell_(fmt::format("{} messages dropped: more came than could be used", dropped));
+    for (const igtl::Envelope& image : lost) inbox_.lose(image);
     for (const Item& item : items) {
       if (stop.stop_requested()) return;
       deal_with(inbox_.take(item.message, item.arrived), stop);

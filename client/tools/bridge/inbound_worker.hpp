@@ -66,6 +66,7 @@ class InboundWorker {
   std::deque<Item> queue_;
   std::size_t queued_bytes_ = 0;
   std::uint64_t dropped_ = 0;
+  std::vector<igtl::Envelope> lost_images_;  // dropped, not yet counted by the inbox
   Followed followed_;
 };
 

@@ -197,8 +197,8 @@ Taken Inbox::take(const igtl::Message& message, TimePoint arrived) {
     keep_transforms(message);
     if (!options_.wants_images()) return taken;
     collector_.take(message, arrived);
-    if (!collector_.full()) return taken;
-    Taken sweep = end_sweep();
+    if (!collector_.full() || collector_.waits_for_a_pause()) return taken;
+    Taken sweep = end_sweep(false);
     std::move(sweep.found.begin(), sweep.found.end(), std::back_inserter(taken.found));
     std::move(sweep.notes.begin(), sweep.notes.end(), std::back_inserter(taken.notes));
   }
@@ -210,7 +210,7 @@ Taken Inbox::tick(TimePoint now) {
   if (!last) return {};
   const double since_s = std::chrono::duration<double>(now - *last).count();
   if (since_s < options_.sweep_gap_s) return {};
-  return end_sweep();
+  return end_sweep(true);
 }
 
 Result<std::vector<ultrasound::Contour>> Inbox::contours_of(const CollectedSweep& sweep,
@@ -227,23 +227,37 @@ Result<std::vector<ultrasound::Contour>> Inbox::contours_of(const CollectedSweep
   }
   const int images = sweep.images.num_frames();
   std::vector<ultrasound::Contour> used;
+  std::size_t left_out = 0;
   for (ultrasound::Contour& contour : contours) {
     if (contour.frame >= images) continue;
     contour.frame = sweep.moment_of_image[static_cast<std::size_t>(contour.frame)];
+    if (contour.frame < 0) {
+      ++left_out;
+      continue;
+    }
     used.push_back(std::move(contour));
   }
-  if (used.size() < contours.size()) {
+  if (left_out > 0) {
+    notes.push_back(fmt::format("{} contours are of images that were left out", left_out));
+  }
+  if (const std::size_t beyond = contours.size() - used.size() - left_out; beyond > 0) {
     notes.push_back(fmt::format("{} contours are of images that the sweep of {} does not have",
-                                contours.size() - used.size(), images));
+                                beyond, images));
   }
   return used;
 }
 
-Taken Inbox::end_sweep() {
+void Inbox::lose(const igtl::Envelope& image) {
+  if (!options_.wants_images()) return;
+  if (options_.image_device.empty() || image.device == options_.image_device) collector_.lose(1);
+}
+
+Taken Inbox::end_sweep(bool paused) {
   Taken taken;
-  const CollectedSweep sweep = collector_.finish();
+  const CollectedSweep sweep = collector_.finish(paused);
   taken.notes = sweep.notes;
   const int images = sweep.images.num_frames();
+  if (images == 0) return taken;
   const auto contours = contours_of(sweep, taken.notes);
   if (!contours) {
     taken.notes.push_back(fmt::format("sweep of {} images: {}", images, contours.error().message));

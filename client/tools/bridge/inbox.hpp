@@ -9,8 +9,8 @@
 //
 // Models and points are in model_frame. When that is not Ras, the newest transforms and the
 // constants lead there; a frame that no chain connects is refused with a note.
-// Contours and seeds count the images of a sweep from 0. The files are read when the sweep ends, so
-// that they may be written while it goes on.
+// Contours and seeds count the images of a sweep that were received, from 0. The files are read
+// when the sweep ends, so that they may be written while it goes on.
 //
 // Statistics: as for `brainshift import`; every point's error has standard deviation sd_mm and is
 // taken as independent of the other points' errors.
@@ -86,6 +86,8 @@ class Inbox {
   igtl::StreamLimits from_upstream() const;
 
   Taken take(const igtl::Message& message, TimePoint arrived);
+  // An image that was received and lost: the images behind it keep their numbers.
+  void lose(const igtl::Envelope& image);
   // Time has passed: a sweep may have ended.
   Taken tick(TimePoint now);
 
@@ -97,7 +99,7 @@ class Inbox {
                       Taken& taken);
   Result<AffineTransform> T_ras_model() const;
   void keep_transforms(const igtl::Message& message);
-  Taken end_sweep();
+  Taken end_sweep(bool paused);
   Result<std::vector<ultrasound::Contour>> contours_of(const CollectedSweep& sweep,
                                                        std::vector<std::string>& notes) const;
 

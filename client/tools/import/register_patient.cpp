@@ -50,6 +50,13 @@ Result<std::vector<TipSample>> tip_path(const RegisterOptions& options, Register
   how.tracking_only = true;
   const auto recording = io::read_sequence(options.recording, how);
   if (!recording) return tl::unexpected(recording.error());
+  if (recording->num_frames() > 1 && recording->time_s.front() == recording->time_s.back()) {
+    return io::unreadable(
+        options.recording,
+        fmt::format("all {} poses have the time {} s: how long the stylus was held "
+                    "still cannot be known",
+                    recording->num_frames(), recording->time_s.front()));
+  }
   const auto constants = device_links(options.device);
   if (!constants) return tl::unexpected(constants.error());
   const auto chain =

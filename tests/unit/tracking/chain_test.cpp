@@ -74,6 +74,24 @@ TEST(Chain, LatencyTakesThePoseOfAnEarlierTime) {
   EXPECT_EQ(chain.why_not[0], "ProbeToTracker was not tracked at that time");
 }
 
+TEST(Chain, AFramesOwnPoseCountsWhateverItsTimeIs) {
+  Recording still = recording();
+  still.time_s.assign(8, 0.0);
+  const auto chain = value_or_fail(evaluate_chain(still, constants(), "Image", "Ras"));
+  for (int i = 0; i < 8; ++i) {
+    const auto& T = chain.T_target_source[static_cast<std::size_t>(i)];
+    ASSERT_TRUE(T);
+    EXPECT_LT((T->matrix() - expected(0.1 * i).matrix()).cwiseAbs().maxCoeff(), 1e-9);
+  }
+  ChainOptions options;
+  options.latency_s = 0.04;
+  EXPECT_THAT(refusal_of(evaluate_chain(still, constants(), "Image", "Ras", options),
+                         ErrorCode::kInvalidArgument),
+              HasSubstr("frames 0 and 1 have the time 0 s and different poses"));
+  for (Link& sample : still.links[0].samples) sample.T_to_from = probe_pose(0.0);
+  EXPECT_TRUE(evaluate_chain(still, constants(), "Image", "Ras", options)) << "one pose";
+}
+
 TEST(Chain, CountsDroppedFramesByReasonAndFirstFrame) {
   Recording broken = recording();
   broken.image_ok[1] = 0;

@@ -132,8 +132,9 @@ TEST(FrameCollector, LeavesOutWhatNoRecordingHoldsAndCountsIt) {
   other.envelope.device = "Endoscope";
   collector.take(other, kBegin);
   collector.take(transform("Nonsense name", 1000, 1.0F), kBegin);
-  EXPECT_EQ(collector.images(), 1);
+  EXPECT_EQ(collector.images(), 4) << "those of the device";
   const CollectedSweep sweep = collector.finish();
+  EXPECT_EQ(sweep.moment_of_image, (std::vector<int>{-1, -1, -1, -1}));
   EXPECT_THAT(sweep.notes, Contains(HasSubstr("1 left out: image of another size")));
   EXPECT_THAT(sweep.notes, Contains(HasSubstr("1 left out: a second image at the same time")));
   EXPECT_THAT(sweep.notes, Contains(HasSubstr("1 left out: image that is not one slice")));
@@ -145,8 +146,8 @@ TEST(FrameCollector, HoldsNoMoreThanItMay) {
   FrameCollector collector({.keep_pixels = true, .max_images = 3});
   for (int i = 0; i < 5; ++i) collector.take(image(1000 + 100 * i), kBegin);
   EXPECT_TRUE(collector.full());
-  EXPECT_EQ(collector.images(), 3);
-  collector.finish();
+  EXPECT_EQ(collector.images(), 5);
+  EXPECT_EQ(collector.finish().moment_of_image, (std::vector<int>{0, 1, 2, -1, -1}));
   EXPECT_FALSE(collector.full());
   // Hours of transforms without an image.
   for (int i = 0; i < 20000; ++i) {
@@ -156,12 +157,50 @@ TEST(FrameCollector, HoldsNoMoreThanItMay) {
   EXPECT_LT(collector.finish().moments.num_frames(), 200);
 }
 
-TEST(FrameCollector, AClockThatRunsBackBeginsAnew) {
+TEST(FrameCollector, AnImageKeepsTheNumberUnderWhichItWasReceived) {
+  FrameCollector collector({.keep_pixels = true});
+  collector.take(image(1000, 1), kBegin);
+  auto colour = image(1100);
+  std::get<igtl::Image>(colour.content).components = 3;
+  collector.take(colour, kBegin);
+  collector.lose(1);
+  collector.take(image(1200, 4), kBegin);
+  const CollectedSweep sweep = collector.finish();
+  EXPECT_EQ(sweep.moment_of_image, (std::vector<int>{0, -1, -1, 2}));
+  EXPECT_EQ(sweep.images.num_frames(), 4);
+  EXPECT_EQ(sweep.images.image_ok, (std::vector<char>{1, 0, 0, 1}));
+  EXPECT_EQ(sweep.images.frame_values(3)(0, 0), 4.0F);
+  EXPECT_THAT(sweep.notes, Contains(HasSubstr("1 left out: image that came faster")));
+}
+
+TEST(FrameCollector, ImagesAndPosesOfOneTimeCannotBeToldApart) {
+  FrameCollector collector({});
+  for (int i = 0; i < 3; ++i) {
+    const int time = i < 2 ? 1000 : 1100;
+    collector.take(transform("ProbeToTracker", time, static_cast<float>(i), "OK"), kBegin);
+    collector.take(transform("ProbeToTracker", time, static_cast<float>(i), "OK"), kBegin);
+    collector.take(image(time), kBegin);
+  }
+  const CollectedSweep sweep = collector.finish();
+  EXPECT_EQ(sweep.moment_of_image, (std::vector<int>{-1, -1, 1}));
+  const auto& probe = link(sweep.moments, "ProbeToTracker");
+  EXPECT_EQ(probe.samples[0].status, LinkStatus::kInvalid);
+  EXPECT_EQ(probe.samples[1].status, LinkStatus::kOk) << "sent twice";
+}
+
+TEST(FrameCollector, BehindAClockThatRanBackNothingCountsUpToAPause) {
   FrameCollector collector({});
   collector.take(image(100000), kBegin);
   collector.take(image(1000), kBegin);
-  EXPECT_EQ(collector.images(), 1);
-  EXPECT_THAT(collector.finish().notes, Contains(HasSubstr("ran backwards")));
+  collector.take(image(1100), kBegin);
+  const CollectedSweep sweep = collector.finish();
+  EXPECT_EQ(sweep.moment_of_image, std::vector<int>{-1});
+  EXPECT_THAT(sweep.notes, Contains(HasSubstr("ran backwards")));
+  EXPECT_THAT(sweep.notes, Contains(HasSubstr("2 left out: image behind the end of a sweep")));
+  collector.take(image(1200), kBegin);
+  EXPECT_EQ(collector.finish(false).moment_of_image, std::vector<int>{0});
+  collector.take(image(1300), kBegin);
+  EXPECT_TRUE(collector.finish().moment_of_image.empty()) << "no pause";
 }
 
 TEST(FrameCollector, WithoutATimestampTheTimeOfArrivalCounts) {

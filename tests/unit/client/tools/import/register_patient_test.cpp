@@ -235,6 +235,32 @@ TEST_F(RegisterPatient, PosesThatTheTrackerLostAreLeftOut) {
   EXPECT_LT(error_mm(), 1e-5);
 }
 
+TEST_F(RegisterPatient, HoldsNeedTimes) {
+  SequenceContent content = stylus.content();
+  for (auto& frame : content.frames) frame["Timestamp"] = "7";
+  options.recording = folder.write("s.mha", test_support::meta_text(content, false));
+  EXPECT_THAT(refusal(), HasSubstr("s.mha: all 245 poses have the time 7 s"));
+}
+
+TEST_F(RegisterPatient, PointsThatNobodyPlacedAreNoFiducials) {
+  options.recording.clear();
+  std::string touched = "name,x,y,z\n", ras = "label,r,a,s,defined\n";
+  for (std::size_t i = 0; i < kFiducials.size(); ++i) {
+    const Vec3 at = VirtualStylus::T_ras_reference().inverse() * kFiducials[i];
+    const Vec3 image = i == 3 ? Vec3::Zero() : kFiducials[i];
+    const auto row = [&](const Vec3& x) {
+      return kNames[i] + "," + std::to_string(x[0]) + "," + std::to_string(x[1]) + "," +
+             std::to_string(x[2]);
+    };
+    touched += row(at) + "\n";
+    ras += row(image) + (i == 3 ? ",0\n" : ",1\n");
+  }
+  options.fiducials = folder.write("touched.csv", touched);
+  options.ras = folder.write("ras.csv", ras);
+  EXPECT_EQ(value_or_fail(register_patient(options)).left_out, std::vector<std::string>{"vertex"});
+  EXPECT_LT(error_mm(), 1e-5);
+}
+
 TEST_F(RegisterPatient, NamesWhatIsMissingOrTooMuch) {
   const auto with = [&](auto change) {
     const RegisterOptions keep = options;
