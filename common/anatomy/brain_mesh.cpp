@@ -16,6 +16,7 @@
 #include "common/geometry/mask.hpp"
 #include "common/geometry/mesh_generation.hpp"
 #include "common/geometry/mesh_quality.hpp"
+#include "common/geometry/misplacement.hpp"
 #include "common/geometry/surface.hpp"
 #include "common/geometry/tet_locator.hpp"
 
@@ -31,47 +32,52 @@ constexpr double kInnerEdge_mm = 4.0;
 constexpr double kLabelSmoothing_mm = 1.0;
 constexpr double kLabelSmoothing_voxels = 0.7;
 
-Result<TriangleSurface> surface_of_label(const VoxelImage& image, int label,
-                                         const std::string& file) {
-  VoxelImage mask = image;
-  std::transform(mask.values.begin(), mask.values.end(), mask.values.begin(), [label](float v) {
-    return std::abs(static_cast<double>(v) - label) < 0.5 ? 1.0f : 0.0f;
-  });
-  const auto component = geometry::largest_component(mask);
-  if (!component)
-    return fail(ErrorCode::kEmptySet,
-                fmt::format("tumour.label_volume.label = {}: no voxel of '{}' has this label",
-                            label, file));
-  const double voxel = std::cbrt(std::abs(image.T_ras_voxel.linear().determinant()));
-  const double sigma = std::max(kLabelSmoothing_mm, kLabelSmoothing_voxels * voxel);
-  const VoxelImage smooth = geometry::gaussian_smooth(*component, sigma);
+// A speck's worth of tumour, and more than a hemisphere.
+constexpr double kSmallestTumour_mm = 2.0;
+constexpr double kLargestTumour_mm = 200.0;
+
+Result<TriangleSurface> surface_of_focus(const VoxelImage& mask, double sigma_mm) {
+  const VoxelImage smooth = geometry::gaussian_smooth(mask, sigma_mm);
   const geometry::Interpolator value(smooth);
   const auto edge = [&value](const Vec3& x) {
     return value(x) > 0.6f ? kInnerEdge_mm : kSurfaceEdge_mm;
   };
   geometry::MeshingOptions options;
   options.sliver_bound_deg = 0.0;
-  const auto mesh = geometry::mesh_mask(smooth, edge, options);
-  if (!mesh)
-    return fail(mesh.error().code,
-                fmt::format("tumour.label_volume.label = {}: too small for a surface: {}", label,
-                            mesh.error().message));
-  return geometry::boundary_surface(*mesh);
+  return geometry::mesh_mask(smooth, edge, options).map([](const TetMesh& mesh) {
+    return geometry::boundary_surface(mesh);
+  });
 }
 
-Result<TriangleSurface> checked_surface(TriangleSurface surface, const std::string& file) {
-  const auto refuse = [&file](ErrorCode code, const std::string& reason) {
-    return fail(code, fmt::format("tumour.surface.file = '{}': {}", file, reason));
-  };
-  if (surface.num_triangles() == 0) return refuse(ErrorCode::kEmptySet, "has no triangle");
-  if (!surface.vertices.allFinite())
-    return refuse(ErrorCode::kNotFinite, "has a vertex that is not finite");
-  if (surface.triangles.minCoeff() < 0 || surface.triangles.maxCoeff() >= surface.num_vertices())
-    return refuse(ErrorCode::kInvalidArgument, "a triangle names a vertex that does not exist");
-  if (!geometry::is_closed(surface))
-    return refuse(ErrorCode::kInvalidArgument, "must be a closed surface");
-  if (geometry::enclosed_volume(surface) < 0.0)
-    surface.triangles.row(1).swap(surface.triangles.row(2));
+void append_surface(TriangleSurface& surface, const TriangleSurface& more) {
+  const int vertices = surface.num_vertices();
+  const Eigen::Index triangles = surface.triangles.cols();
+  surface.vertices.conservativeResize(3, vertices + more.num_vertices());
+  surface.vertices.rightCols(more.num_vertices()) = more.vertices;
+  surface.triangles.conservativeResize(3, triangles + more.triangles.cols());
+  surface.triangles.rightCols(more.triangles.cols()) = more.triangles.array() + vertices;
+}
+
+Result<TriangleSurface> surface_of_labels(const VoxelImage& image, const TumourLabel& tumour,
+                                          Notes* notes) {
+  const std::string what = fmt::format("tumour.label_volume.file = '{}'", tumour.path.string());
+  const double voxel = std::cbrt(std::abs(image.T_ras_voxel.linear().determinant()));
+  const double sigma = std::max(kLabelSmoothing_mm, kLabelSmoothing_voxels * voxel);
+  const auto foci = tumour_foci(image, tumour.labels, 4.0 * sigma + 2.0 * voxel, what, notes);
+  if (!foci) return tl::unexpected(foci.error());
+  TriangleSurface surface;
+  surface.vertices.resize(3, 0), surface.triangles.resize(3, 0);
+  for (const Focus& focus : *foci) {
+    const auto part = surface_of_focus(focus.mask, sigma);
+    if (part) {
+      append_surface(surface, *part);
+      continue;
+    }
+    const std::string reason = fmt::format("{}: a part of {:.2f} cc is too small for a surface: {}",
+                                           what, focus.volume_mm3 / 1000.0, part.error().message);
+    if (&focus == &foci->front()) return fail(part.error().code, reason);
+    add_note(notes, reason + "; it is left out");
+  }
   return surface;
 }
 
@@ -83,22 +89,30 @@ const char* tumour_key(const CaseConfig& config) {
   return "tumour.surface";
 }
 
-Result<TriangleSurface> make_tumour_surface(const CaseInputs& inputs) {
+Result<TriangleSurface> make_tumour_surface(const CaseInputs& inputs, Notes* notes) {
   if (const auto* ellipsoid = std::get_if<TumourEllipsoid>(&inputs.config.tumour))
     return geometry::ellipsoid_surface(ellipsoid->centre_mm, ellipsoid->semi_axes_mm,
                                        kSurfaceEdge_mm);
   if (const auto* label = std::get_if<TumourLabel>(&inputs.config.tumour)) {
     if (!inputs.tumour_labels) return invalid("tumour.label_volume.file: was not read");
-    return surface_of_label(*inputs.tumour_labels, label->label, label->path.string());
+    return surface_of_labels(*inputs.tumour_labels, *label, notes);
   }
   if (!inputs.tumour_surface) return invalid("tumour.surface.file: was not read");
-  return checked_surface(*inputs.tumour_surface,
-                         std::get<TumourSurfaceFile>(inputs.config.tumour).path.string());
+  const std::string what =
+      fmt::format("tumour.surface.file = '{}'",
+                  std::get<TumourSurfaceFile>(inputs.config.tumour).path.string());
+  auto surface = closed_surface(*inputs.tumour_surface, what, notes);
+  if (!surface) return surface;
+  const Vec3 size = surface->vertices.rowwise().maxCoeff() - surface->vertices.rowwise().minCoeff();
+  const Status fits = check_extent(size, what + ":", kSmallestTumour_mm, kLargestTumour_mm);
+  if (!fits) return tl::unexpected(fits.error());
+  return surface;
 }
 
 Result<FittedTumour> fit_tumour(TriangleSurface tumour, const TetMesh& mesh,
                                 const CaseConfig& config) {
   const geometry::TetLocator locator(mesh);
+  const Points given = tumour.vertices;
   FittedTumour fitted{std::move(tumour), {}};
   int outside = 0;
   double farthest = 0.0;
@@ -114,8 +128,13 @@ Result<FittedTumour> fit_tumour(TriangleSurface tumour, const TetMesh& mesh,
       fmt::format("{}: {} of {} tumour surface points lie outside the brain, by up to {:.1f} mm",
                   tumour_key(config), outside, fitted.surface.num_vertices(), farthest);
   if (farthest > kLargestCut_mm) {
-    return invalid(
-        fmt::format("{}; at most {:g} mm are cut at the brain's surface", what, kLargestCut_mm));
+    const std::string mistake = geometry::likely_mistake(given, [&locator](const Points& meant) {
+      return std::all_of(meant.colwise().begin(), meant.colwise().end(), [&](const auto& x) {
+        return locator.locate(x).distance_mm <= kLargestCut_mm;
+      });
+    });
+    return invalid(fmt::format("{}; at most {:g} mm are cut at the brain's surface{}", what,
+                               kLargestCut_mm, mistake));
   }
   fitted.note = what + "; they were moved to its surface";
   return fitted;
@@ -133,17 +152,8 @@ constexpr int kRimSamples = 96;
 // As far from the tangent plane as a craniotomy node may lie (brain_model_builder.cpp).
 constexpr double kRimSearch_mm = 15.0;
 
-Status check_extent(const Vec3& size, const std::string& what) {
-  const double extent = size.maxCoeff();
-  if (extent >= kSmallestExtent_mm && extent <= kLargestExtent_mm) return {};
-  // The usual mistake is a factor of 1000 either way.
-  const char* hint = "";
-  if (extent * 1000.0 >= kSmallestExtent_mm && extent * 1000.0 <= kLargestExtent_mm)
-    hint = "; metres instead of millimetres?";
-  if (extent / 1000.0 >= kSmallestExtent_mm && extent / 1000.0 <= kLargestExtent_mm)
-    hint = "; micrometres instead of millimetres?";
-  return invalid(fmt::format("{}: brain extent {:.4g} mm must be between {} and {} mm{}", what,
-                             extent, kSmallestExtent_mm, kLargestExtent_mm, hint));
+Status check_brain_extent(const Vec3& size, const std::string& what) {
+  return check_extent(size, what + ": brain", kSmallestExtent_mm, kLargestExtent_mm);
 }
 
 // Size of the box round the voxels > 0, in mm.
@@ -284,14 +294,13 @@ Result<geometry::SizingField> sizing_field(const MeshGeneration& settings,
 }
 
 Result<TetMesh> generate(const CaseInputs& inputs, const MeshGeneration& settings,
-                         const TriangleSurface& tumour, const Progress& progress) {
+                         const TriangleSurface& tumour, const Progress& progress, Notes* notes) {
   const std::string file = fmt::format("images.brain = '{}'", inputs.config.brain.string());
   if (!inputs.brain) return invalid(file + ": was not read");
   report(progress, "mask", 0.0);
-  const auto component = geometry::largest_component(*inputs.brain);
-  if (!component)
-    return fail(component.error().code, fmt::format("{}: {}", file, component.error().message));
-  if (Status status = check_extent(mask_extent(*component), file); !status)
+  const auto component = brain_mask(*inputs.brain, file, notes);
+  if (!component) return tl::unexpected(component.error());
+  if (Status status = check_brain_extent(mask_extent(*component), file); !status)
     return tl::unexpected(status.error());
   const VoxelImage smooth = geometry::gaussian_smooth(*component, settings.smoothing_mm);
   const auto edge_mm = sizing_field(settings, inputs.config.craniotomy, smooth, tumour);
@@ -304,9 +313,9 @@ Result<TetMesh> generate(const CaseInputs& inputs, const MeshGeneration& setting
 }  // namespace
 
 Result<TetMesh> make_brain_mesh(const CaseInputs& inputs, const TriangleSurface& tumour,
-                                const Progress& progress) {
+                                const Progress& progress, Notes* notes) {
   if (const auto* settings = std::get_if<MeshGeneration>(&inputs.config.mesh))
-    return generate(inputs, *settings, tumour, progress);
+    return generate(inputs, *settings, tumour, progress, notes);
   const std::string file =
       fmt::format("mesh.file = '{}'", std::get<MeshFile>(inputs.config.mesh).path.string());
   if (!inputs.mesh) return invalid(file + ": was not read");
@@ -315,7 +324,8 @@ Result<TetMesh> make_brain_mesh(const CaseInputs& inputs, const TriangleSurface&
     return fail(status.error().code, fmt::format("{}: {}", file, status.error().message));
   const Vec3 size =
       inputs.mesh->nodes.rowwise().maxCoeff() - inputs.mesh->nodes.rowwise().minCoeff();
-  if (Status status = check_extent(size, file); !status) return tl::unexpected(status.error());
+  if (Status status = check_brain_extent(size, file); !status)
+    return tl::unexpected(status.error());
   return *inputs.mesh;
 }
 

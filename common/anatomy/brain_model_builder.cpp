@@ -11,6 +11,7 @@
 #include "common/anatomy/brain_mesh.hpp"
 #include "common/geometry/closest_point.hpp"
 #include "common/geometry/distance_volume.hpp"
+#include "common/geometry/misplacement.hpp"
 #include "common/geometry/surface.hpp"
 #include "common/values/model_id.hpp"
 
@@ -23,6 +24,14 @@ constexpr double kLargestHeight_mm = 15.0;
 // cos 60 degrees. A node whose normal turns further belongs to the wall of a sulcus or the far
 // side.
 constexpr double kMinCosine = 0.5;
+
+// Bounds of a head's skull, perhaps open.
+constexpr double kSmallestSkull_mm = 20.0;
+constexpr double kLargestSkull_mm = 500.0;
+// Atrophy leaves up to a centimetre between brain and skull.
+constexpr double kFarthestSkull_mm = 15.0;
+// A node that stands deeper than this makes every update unusable (values/quality.hpp).
+constexpr double kDeepest_mm = 3.0;
 
 enum class Role { kNone, kCraniotomy, kBrainstem };
 
@@ -106,31 +115,98 @@ Result<std::vector<Role>> place_roles(const BrainSurface& brain, const CaseConfi
   return roles;
 }
 
-// Turns a given skull so that its normals agree with the brain's. The skull may be open (with its
-// craniotomy), so the sign of its volume cannot decide; the brain beneath it can.
-Result<TriangleSurface> oriented_skull(TriangleSurface skull, const BrainSurface& brain,
-                                       const std::string& file) {
+// How the nodes that may touch the skull stand to it.
+struct SkullFit {
+  double median_mm = 0.0;   // of their distances from it
+  double deepest_mm = 0.0;  // how far one stands outside of it
+  int outside = 0;
+  bool turned = false;  // the skull's normals look inwards
+};
+
+// The skull may be open (with its craniotomy), so the sign of its volume cannot say where it
+// looks; the brain beneath it can.
+Result<SkullFit> fit_of_skull(const TriangleSurface& skull, const BrainSurface& brain,
+                              const std::vector<NodeIndex>& slaves) {
   const auto index = geometry::ClosestPointIndex::build(skull);
-  if (!index)
-    return fail(index.error().code,
-                fmt::format("contact.skull_file = '{}': {}", file, index.error().message));
+  if (!index) return tl::unexpected(index.error());
   double agreement = 0.0;
+  std::vector<double> distances, gaps;
   for (int v = 0; v < brain.surface.num_vertices(); ++v) {
-    const auto nearest = index->closest(brain.surface.vertices.col(v));
-    agreement += index->triangle_normal(nearest.triangle).dot(brain.normals.col(v));
+    const Vec3 x = brain.surface.vertices.col(v);
+    const auto nearest = index->closest(x);
+    const Vec3 normal = index->triangle_normal(nearest.triangle);
+    agreement += normal.dot(brain.normals.col(v));
+    const NodeIndex node = brain.node_of_vertex[static_cast<std::size_t>(v)];
+    if (!std::binary_search(slaves.begin(), slaves.end(), node)) continue;
+    distances.push_back(nearest.distance_mm);
+    gaps.push_back(normal.dot(nearest.point - x));
   }
-  if (agreement < 0.0) skull.triangles.row(1).swap(skull.triangles.row(2));
+  SkullFit fit;
+  fit.turned = agreement < 0.0;
+  for (const double gap : gaps) {
+    const double depth = fit.turned ? gap : -gap;
+    fit.outside += depth > 0.0 ? 1 : 0;
+    fit.deepest_mm = std::max(fit.deepest_mm, depth);
+  }
+  const auto middle = distances.begin() + static_cast<std::ptrdiff_t>(distances.size() / 2);
+  std::nth_element(distances.begin(), middle, distances.end());
+  fit.median_mm = *middle;
+  return fit;
+}
+
+// A given skull against the brain, with its normals turned outwards. kInvalidArgument names the
+// key.
+Result<TriangleSurface> checked_skull(TriangleSurface skull, const BrainSurface& brain,
+                                      const std::vector<NodeIndex>& slaves, const std::string& what,
+                                      Notes* notes) {
+  if (Status whole = check_surface(skull, what); !whole) return tl::unexpected(whole.error());
+  const Vec3 size = skull.vertices.rowwise().maxCoeff() - skull.vertices.rowwise().minCoeff();
+  const Status extent = check_extent(size, what + ": skull", kSmallestSkull_mm, kLargestSkull_mm);
+  if (!extent) return tl::unexpected(extent.error());
+  if (const int edges = geometry::turned_edges(skull); edges > 0) {
+    return invalid(fmt::format(
+        "{}: {} edges join triangles whose normals look to opposite sides: parts of the skull are "
+        "turned inside out",
+        what, edges));
+  }
+  const auto fit = fit_of_skull(skull, brain, slaves);
+  if (!fit) return fail(fit.error().code, what + ": " + fit.error().message);
+  const bool near = fit->median_mm <= kFarthestSkull_mm;
+  if (!near || fit->deepest_mm > kDeepest_mm) {
+    const std::string mistake = geometry::likely_mistake(skull.vertices, [&](const Points& meant) {
+      const auto other = fit_of_skull({meant, skull.triangles}, brain, slaves);
+      return other && other->median_mm <= kFarthestSkull_mm && other->deepest_mm <= kDeepest_mm;
+    });
+    if (!near) {
+      return invalid(fmt::format(
+          "{}: the skull lies {:.1f} mm from the brain (median over the nodes that may touch it): "
+          "must be at most {:g} mm{}",
+          what, fit->median_mm, kFarthestSkull_mm, mistake));
+    }
+    return invalid(fmt::format(
+        "{}: {} of {} nodes of the brain that may touch the skull stand outside of it, by up to "
+        "{:.1f} mm: must be at most {:g} mm{}",
+        what, fit->outside, slaves.size(), fit->deepest_mm, kDeepest_mm, mistake));
+  }
+  if (fit->outside > 0) {
+    add_note(notes, fmt::format("{}: {} of {} nodes of the brain that may touch the skull stand "
+                                "outside of it before surgery, by up to {:.2f} mm",
+                                what, fit->outside, slaves.size(), fit->deepest_mm));
+  }
+  if (fit->turned) skull.triangles.row(1).swap(skull.triangles.row(2));
   return skull;
 }
 
 // The patient's own inner skull surface, or the brain's surface moved outwards by the gap.
-Result<TriangleSurface> make_skull(const CaseInputs& inputs, const BrainSurface& brain) {
+Result<TriangleSurface> make_skull(const CaseInputs& inputs, const BrainSurface& brain,
+                                   const NodeSets& sets, Notes* notes) {
   const ContactConfig& contact = inputs.config.contact;
   if (!contact.skull_file) return geometry::offset_surface(brain.surface, contact.gap_mm);
-  if (!inputs.skull)
-    return invalid(
-        fmt::format("contact.skull_file = '{}': was not read", contact.skull_file->string()));
-  return oriented_skull(*inputs.skull, brain, contact.skull_file->string());
+  const std::string what = fmt::format("contact.skull_file = '{}'", contact.skull_file->string());
+  if (!inputs.skull) return invalid(what + ": was not read");
+  std::vector<NodeIndex> slaves = sets.slaves;
+  std::sort(slaves.begin(), slaves.end());
+  return checked_skull(*inputs.skull, brain, slaves, what, notes);
 }
 
 // Distance grid of the tumour, for fast alignment. It is empty for a segmentation whose parts
@@ -194,10 +270,10 @@ Result<BrainModel> build_brain_model(const CaseInputs& inputs, const Progress& p
   if (Status status = validate(config); !status) return tl::unexpected(status.error());
 
   report(progress, "tumour surface", 0.0);
-  auto tumour = make_tumour_surface(inputs);
+  auto tumour = make_tumour_surface(inputs, notes);
   if (!tumour) return tl::unexpected(tumour.error());
 
-  auto mesh = make_brain_mesh(inputs, *tumour, progress);
+  auto mesh = make_brain_mesh(inputs, *tumour, progress, notes);
   if (!mesh) return tl::unexpected(mesh.error());
   auto fitted = fit_tumour(std::move(*tumour), *mesh, config);
   if (!fitted) return tl::unexpected(fitted.error());
@@ -207,7 +283,7 @@ Result<BrainModel> build_brain_model(const CaseInputs& inputs, const Progress& p
   const BrainSurface brain = brain_surface_of(*mesh);
   auto sets = select_node_sets(brain, config);
   if (!sets) return tl::unexpected(sets.error());
-  auto skull = make_skull(inputs, brain);
+  auto skull = make_skull(inputs, brain, *sets, notes);
   if (!skull) return tl::unexpected(skull.error());
 
   report(progress, "tumour distances", 0.0);

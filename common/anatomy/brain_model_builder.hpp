@@ -50,7 +50,10 @@ Result<NodeSets> select_node_sets(const BrainSurface& brain, const CaseConfig& c
 //   kEmptySet         mask without component, a craniotomy that selects no node, no slave, no
 //                     tumour voxel
 //   kInvalidArgument  tumour outside the brain by more than kLargestCut_mm (brain_mesh.hpp);
-//                     metres and millimetres mixed up in a given mesh (by its extent)
+//                     metres and millimetres mixed up in a given mesh, tumour or skull (by its
+//                     extent); a given skull that is turned inside out in parts, lies farther than
+//                     15 mm from the nodes that may touch it (median), or has one of them more than
+//                     3 mm outside; inputs that given_inputs.hpp refuses
 //   kDegenerateMesh   as make_brain_mesh
 // notes (optional) receives what was made of the inputs that the user should know, a sentence each.
 Result<BrainModel> build_brain_model(const CaseInputs& inputs, const Progress& progress = {},

@@ -40,9 +40,9 @@ struct TumourEllipsoid {
   Vec3 semi_axes_mm = Vec3::Ones();
 };
 struct TumourLabel {
-  std::filesystem::path path;  // NIfTI or NRRD label volume
-  int label = 1;
-  std::optional<std::string> segment = {};  // of a .seg.nrrd, by name; then `label` does not matter
+  std::filesystem::path path;               // NIfTI or NRRD label volume
+  std::vector<int> labels = {1};            // the tumour is all of them together
+  std::optional<std::string> segment = {};  // of a .seg.nrrd, by name; then labels do not matter
 };
 struct TumourSurfaceFile {
   std::filesystem::path path;  // .stl, .ply, .obj or .vtp, mm RAS, closed

@@ -86,8 +86,9 @@ void visit_kind(A& a, V& v) {
   a.section({kind_name(v), "", "A label in a segmentation"}, Need::kRequired, [&] {
     a({"file", "", "The segmentation: NIfTI, or NRRD as 3D Slicer writes it (.nrrd, .seg.nrrd)"},
       v.path, Need::kRequired);
-    a({"label", "", "The tumour's label", "", "Not used where the file names its segments."},
-      v.label, unlimited());
+    a({"label", "", "The tumour's label, or a list of labels that are the tumour together", "",
+       "Not used where the file names its segments."},
+      v.labels, unlimited());
     a({"segment", "", "The tumour's name in a .seg.nrrd", "",
        "Not needed where the file has one segment."},
       v.segment);

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "common/configuration/key_table.hpp"
 
+#include <algorithm>
 #include <cmath>
 #include <sstream>
 
@@ -48,6 +49,15 @@ void KeyChecker::operator()(const Key& key, const std::vector<double>& value,
                             const Limits& limits) {
   for (std::size_t i = 0; i < value.size(); ++i) {
     check(full(key) + "[" + std::to_string(i) + "]", value[i], limits);
+  }
+}
+
+void KeyChecker::operator()(const Key& key, const std::vector<int>& value, const Limits& limits) {
+  require(!value.empty(), full(key), "must name at least one");
+  for (std::size_t i = 0; i < value.size(); ++i) {
+    check(full(key) + "[" + std::to_string(i) + "]", value[i], limits);
+    require(std::count(value.begin(), value.end(), value[i]) == 1, full(key),
+            "names " + std::to_string(value[i]) + " twice");
   }
 }
 

@@ -138,6 +138,8 @@ class KeyChecker : public KeyWalker<KeyChecker> {
   }
   void operator()(const Key& key, const Vec3& value, const Limits& limits, Need = Need::kOptional);
   void operator()(const Key& key, const std::vector<double>& value, const Limits& limits);
+  // At least one, each once.
+  void operator()(const Key& key, const std::vector<int>& value, const Limits& limits);
   // A text that is needed must not be empty.
   void operator()(const Key& key, const std::string& value, Need need = Need::kOptional);
   // A text that may be left out must not be empty where it is given.

@@ -200,6 +200,38 @@ Result<VoxelImage> largest_component(const VoxelImage& image) {
   return result;
 }
 
+MaskParts mask_parts(const VoxelImage& image) {
+  assert(image.values.size() == image.num_voxels());
+  Binary voxels(image.values.size());
+  std::transform(image.values.begin(), image.values.end(), voxels.begin(),
+                 [](float v) { return static_cast<std::uint8_t>(v > 0.0f); });
+  MaskParts parts;
+  parts.part_of_voxel.assign(voxels.size(), -1);
+  if (voxels.empty()) return parts;
+  RunComponents components(voxels, image.dims, 1);
+  std::vector<std::size_t> size(components.num_runs(), 0), roots;
+  components.for_each([&](std::size_t, std::size_t r) {
+    const Run& run = components.run(r);
+    if (components.root(r) == r) roots.push_back(r);
+    size[components.root(r)] += static_cast<std::size_t>(run.end - run.begin);
+  });
+  std::stable_sort(roots.begin(), roots.end(),
+                   [&](std::size_t a, std::size_t b) { return size[a] > size[b]; });
+  std::vector<std::int32_t> number(components.num_runs(), -1);
+  for (std::size_t i = 0; i < roots.size(); ++i) {
+    number[roots[i]] = static_cast<std::int32_t>(i);
+    parts.voxels.push_back(size[roots[i]]);
+  }
+  const auto width = static_cast<std::size_t>(image.dims[0]);
+  components.for_each([&](std::size_t row, std::size_t r) {
+    const Run& run = components.run(r);
+    std::fill(parts.part_of_voxel.begin() + static_cast<std::ptrdiff_t>(row * width) + run.begin,
+              parts.part_of_voxel.begin() + static_cast<std::ptrdiff_t>(row * width) + run.end,
+              number[components.root(r)]);
+  });
+  return parts;
+}
+
 VoxelImage gaussian_smooth(const VoxelImage& image, double sigma_mm) {
   assert(image.values.size() == image.num_voxels());
   assert(sigma_mm >= 0.0);

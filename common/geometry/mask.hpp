@@ -2,6 +2,9 @@
 // Brain masks: threshold, largest component, smoothing.
 #pragma once
 
+#include <cstdint>
+#include <vector>
+
 #include "common/core/error.hpp"
 #include "common/core/mesh.hpp"
 
@@ -12,6 +15,14 @@ namespace brainshift::geometry {
 // image. Of components with the same size, the one with the lowest voxel index wins. NaN counts
 // as not > 0. Linear time, by run-length union-find. kEmptySet when no voxel is > 0.
 Result<VoxelImage> largest_component(const VoxelImage& image);
+
+// The 6-connected components of the voxels that are > 0, largest first; of equal ones the one with
+// the lowest voxel index.
+struct MaskParts {
+  std::vector<std::int32_t> part_of_voxel;  // -1: none
+  std::vector<std::size_t> voxels;          // of each part
+};
+MaskParts mask_parts(const VoxelImage& image);
 
 // Gaussian smoothing with standard deviation sigma_mm >= 0 (per axis, mm). Voxels outside the
 // image count as zero. Separable along the voxel axes, cut off at 3.5 sigma and normalised;

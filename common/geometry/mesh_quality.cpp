@@ -90,6 +90,38 @@ Status check_volumes(const TetMesh& mesh) {
   return {};
 }
 
+// Tetrahedra that overlap count their tissue twice. Two on one side of a face overlap; a
+// tetrahedron that is there twice has this on all of its faces.
+Status check_overlap(const TetMesh& mesh) {
+  const std::vector<ComponentFace> faces = sorted_faces(mesh.tets);
+  const auto side = [&mesh](const ComponentFace& face) {
+    const auto nodes = mesh.tets.col(face.tet);
+    Vec3 centre = Vec3::Zero();
+    for (const int n : nodes) centre += 0.25 * mesh.nodes.col(n);
+    const Vec3 a = mesh.nodes.col(face.nodes[0]), b = mesh.nodes.col(face.nodes[1]),
+               c = mesh.nodes.col(face.nodes[2]);
+    return (b - a).cross(c - a).dot(centre - a) > 0.0;
+  };
+  int count = 0;
+  std::string first;
+  for (std::size_t i = 0; i + 1 < faces.size(); ++i) {
+    for (std::size_t k = i + 1; k < faces.size() && faces[k].nodes == faces[i].nodes; ++k) {
+      if (side(faces[i]) != side(faces[k])) continue;
+      if (count++ > 0) continue;
+      const bool same = std::is_permutation(mesh.tets.col(faces[i].tet).begin(),
+                                            mesh.tets.col(faces[i].tet).end(),
+                                            mesh.tets.col(faces[k].tet).begin());
+      first = fmt::format("tetrahedra {} and {} {}", std::min(faces[i].tet, faces[k].tet),
+                          std::max(faces[i].tet, faces[k].tet),
+                          same ? "have the same four nodes" : "overlap");
+    }
+  }
+  if (count == 0) return {};
+  return fail(ErrorCode::kDegenerateMesh,
+              fmt::format("mesh {}: tissue would count twice ({} faces have two on one side)",
+                          first, count));
+}
+
 Status check_connected(const TetMesh& mesh) {
   std::vector<char> used(static_cast<std::size_t>(mesh.num_nodes()), 0);
   for (int t = 0; t < mesh.num_tets(); ++t)
@@ -148,7 +180,8 @@ TetComponents tet_components(const Eigen::Matrix<int, 4, Eigen::Dynamic>& tets) 
 
 Status check_mesh(const TetMesh& mesh) {
   if (mesh.num_tets() == 0) return fail(ErrorCode::kEmptySet, "mesh has no tetrahedron");
-  for (const auto check : {check_nodes, check_indices, check_volumes, check_connected})
+  for (const auto check :
+       {check_nodes, check_indices, check_volumes, check_overlap, check_connected})
     if (Status status = check(mesh); !status) return status;
   return {};
 }

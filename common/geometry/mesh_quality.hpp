@@ -24,7 +24,8 @@ TetComponents tet_components(const Eigen::Matrix<int, 4, Eigen::Dynamic>& tets);
 // Ok, or one sentence that names the first offender.
 //   kNotFinite        a node
 //   kInvalidArgument  a node index out of range
-//   kDegenerateMesh   an inverted or flat tetrahedron, with its volume; several components; unused
+//   kDegenerateMesh   an inverted or flat tetrahedron, with its volume; two tetrahedra on one side
+//                     of a face (one of them twice, or both overlap); several components; unused
 //                     nodes. Flat means volume < 1e-9 x (longest edge)^3.
 //   kEmptySet         no tetrahedron
 Status check_mesh(const TetMesh& mesh);

@@ -7,6 +7,8 @@
 #include <cmath>
 #include <map>
 #include <numbers>
+#include <numeric>
+#include <set>
 #include <tuple>
 #include <utility>
 
@@ -254,6 +256,75 @@ bool is_closed(const TriangleSurface& surface) {
     return e.first != e.second &&
            std::binary_search(edges.begin(), edges.end(), std::pair(e.second, e.first));
   });
+}
+
+int turned_edges(const TriangleSurface& surface) {
+  struct Uses {
+    int forwards = 0, backwards = 0;
+  };
+  std::map<std::pair<int, int>, Uses> edges;
+  for (int t = 0; t < surface.num_triangles(); ++t) {
+    for (int k = 0; k < 3; ++k) {
+      const int a = surface.triangles(k, t), b = surface.triangles((k + 1) % 3, t);
+      Uses& uses = edges[std::minmax(a, b)];
+      ++(a < b ? uses.forwards : uses.backwards);
+    }
+  }
+  return static_cast<int>(std::count_if(edges.begin(), edges.end(), [](const auto& edge) {
+    const Uses& uses = edge.second;
+    return std::max(uses.forwards, uses.backwards) == 2 &&
+           std::min(uses.forwards, uses.backwards) == 0;
+  }));
+}
+
+MendedSurface mend_surface(const TriangleSurface& surface, double tolerance_mm) {
+  const int count = surface.num_vertices();
+  std::vector<int> order(static_cast<std::size_t>(count)), meant(order.size());
+  std::iota(order.begin(), order.end(), 0);
+  std::iota(meant.begin(), meant.end(), 0);
+  std::sort(order.begin(), order.end(), [&](int a, int b) {
+    return std::pair(surface.vertices(0, a), a) < std::pair(surface.vertices(0, b), b);
+  });
+  MendedSurface mended;
+  for (std::size_t i = 0; i < order.size(); ++i) {
+    const Vec3 x = surface.vertices.col(order[i]);
+    for (std::size_t k = i; k-- > 0;) {
+      const int other = order[k];
+      if (x[0] - surface.vertices(0, other) > tolerance_mm) break;
+      if ((x - surface.vertices.col(other)).norm() > tolerance_mm) continue;
+      meant[static_cast<std::size_t>(order[i])] = meant[static_cast<std::size_t>(other)];
+      ++mended.merged_vertices;
+      break;
+    }
+  }
+  std::set<std::array<int, 3>> seen;  // the lowest vertex first
+  std::vector<int> corners, new_index(order.size(), -1);
+  for (int t = 0; t < surface.num_triangles(); ++t) {
+    std::array<int, 3> corner{};
+    for (std::size_t k = 0; k < 3; ++k) {
+      corner[k] = meant[static_cast<std::size_t>(surface.triangles(static_cast<int>(k), t))];
+    }
+    if (corner[0] == corner[1] || corner[1] == corner[2] || corner[2] == corner[0]) continue;
+    std::rotate(corner.begin(), std::min_element(corner.begin(), corner.end()), corner.end());
+    if (!seen.insert(corner).second) {
+      ++mended.repeated_triangles;
+      continue;
+    }
+    corners.insert(corners.end(), corner.begin(), corner.end());
+    for (const int v : corner) new_index[static_cast<std::size_t>(v)] = 0;
+  }
+  mended.surface.vertices.resize(3, count);
+  int next = 0;
+  for (int v = 0; v < count; ++v) {
+    int& index = new_index[static_cast<std::size_t>(v)];
+    if (index < 0) continue;
+    mended.surface.vertices.col(index = next++) = surface.vertices.col(v);
+  }
+  mended.surface.vertices.conservativeResize(Eigen::NoChange, next);
+  for (int& v : corners) v = new_index[static_cast<std::size_t>(v)];
+  mended.surface.triangles =
+      Eigen::Map<const Triangles>(corners.data(), 3, static_cast<Eigen::Index>(corners.size() / 3));
+  return mended;
 }
 
 TriangleSurface ellipsoid_surface(const Vec3& centre, const Vec3& semi_axes_mm, double edge_mm) {

@@ -46,6 +46,20 @@ Vec3 vector_area(const TriangleSurface& surface);
 // True when every edge is shared by exactly two oppositely oriented triangles.
 bool is_closed(const TriangleSurface& surface);
 
+// Edges of exactly two triangles that pass it in the same direction: their normals look to
+// opposite sides.
+int turned_edges(const TriangleSurface& surface);
+
+// A surface as other programs write it, mended where that loses nothing: vertices within
+// tolerance_mm of each other become one (cracks), triangles that collapse thereby go, and so do
+// those that are there twice with the same orientation. Vertices without a triangle go too.
+struct MendedSurface {
+  TriangleSurface surface;
+  int merged_vertices = 0;
+  int repeated_triangles = 0;
+};
+MendedSurface mend_surface(const TriangleSurface& surface, double tolerance_mm);
+
 // Closed surface of an ellipsoid with about `edge_mm` between neighbouring vertices: a geodesic
 // sphere of frequency n (10 n^2 + 2 vertices, all on the ellipsoid), stretched. Its volume is
 // below that of the ellipsoid by a fraction of order (edge / radius)^2. Axes and edge must be >

@@ -8,6 +8,8 @@
 #include <cstdint>
 #include <unordered_map>
 
+#include "common/geometry/misplacement.hpp"
+
 namespace brainshift::geometry {
 namespace {
 
@@ -113,6 +115,7 @@ Result<SurfaceRims> surface_rims(const TriangleSurface& surface) {
     for (int edge = start; !walked[static_cast<std::size_t>(edge)];
          edge = next_on_rim(surface, *edges, edge)) {
       walked[static_cast<std::size_t>(edge)] = true;
+      ++rims.open_edges;
       length += (surface.vertices.col(corner(surface, next_in_triangle(edge))) -
                  surface.vertices.col(corner(surface, edge)))
                     .norm();
@@ -252,10 +255,15 @@ Result<CheckedSurface> check_cortical_surface(TriangleSurface surface, const Cor
   if (Status ok = check_extent(checked.extent_mm, site); !ok) return tl::unexpected(ok.error());
   checked.distance_mm = (points.colwise() - site.centre).colwise().norm().minCoeff();
   if (checked.distance_mm > kFarthest_mm) {
-    return invalid(
-        fmt::format("the surface's closest point is {:.1f} mm from the craniotomy's centre: must "
-                    "be within {:g} mm; is its pose right?",
-                    checked.distance_mm, kFarthest_mm));
+    const std::string mistake = likely_mistake(points, [&](const Points& meant) {
+      const double extent = (meant.rowwise().maxCoeff() - meant.rowwise().minCoeff()).norm();
+      return check_extent(extent, site) &&
+             (meant.colwise() - site.centre).colwise().norm().minCoeff() <= kFarthest_mm;
+    });
+    return invalid(fmt::format(
+        "the surface's closest point is {:.1f} mm from the craniotomy's centre: must "
+        "be within {:g} mm{}",
+        checked.distance_mm, kFarthest_mm, mistake.empty() ? "; is its pose right?" : mistake));
   }
   if (checked.surface.num_triangles() == 0) return checked;
   const auto rims = surface_rims(checked.surface);

@@ -37,6 +37,7 @@ struct SurfaceRims {
   int parts = 0;                 // components of triangles connected by edges
   std::vector<int> part_of_rim;  // per closed rim
   std::vector<double> rim_mm;    // its length
+  int open_edges = 0;            // of all rims
 };
 
 // kDegenerateMesh: a triangle with a repeated or unknown vertex, an edge of more than two

@@ -24,6 +24,7 @@ class KeyDocumenter : public KeyWalker<KeyDocumenter> {
   void operator()(const Key& key, const Vec3& value, const Limits& limits,
                   Need need = Need::kOptional);
   void operator()(const Key& key, const std::vector<double>& value, const Limits& limits);
+  void operator()(const Key& key, const std::vector<int>& value, const Limits& limits);
   void operator()(const Key& key, const std::string& value, Need need = Need::kOptional);
   void operator()(const Key& key, const std::filesystem::path& value, Need need = Need::kOptional);
   void operator()(const Key& key, const std::optional<std::filesystem::path>& value);
@@ -131,6 +132,11 @@ inline void KeyDocumenter::operator()(const Key& key, const Vec3& value, const L
 inline void KeyDocumenter::operator()(const Key& key, const std::vector<double>& value,
                                       const Limits& limits) {
   add(key, "Default " + digits_of_list(value), range_of(limits, "each"));
+}
+
+inline void KeyDocumenter::operator()(const Key& key, const std::vector<int>& value,
+                                      const Limits&) {
+  add(key, "Default " + digits_of_list(std::vector<double>(value.begin(), value.end())), "");
 }
 
 inline void KeyDocumenter::operator()(const Key& key, const std::string& value, Need need) {

@@ -31,7 +31,7 @@ tl::unexpected<Error> about(const std::string& prefix, const Error& error) {
 // scan.nii.gz -> scan
 std::string stem_of(const fs::path& image) {
   fs::path stem = image.stem();
-  if (stem.extension() == ".nii") stem = stem.stem();
+  if (io::lower_extension(stem) == ".nii") stem = stem.stem();
   return stem.string();
 }
 
@@ -62,7 +62,7 @@ Status check_options(const ExportOptions& options) {
 Result<fs::path> checked_folder(const fs::path& named) {
   if (Status ok = io::check_output_folder("--out", named); !ok) return tl::unexpected(ok.error());
   std::error_code failed;
-  fs::path folder = fs::weakly_canonical(named, failed);
+  fs::path folder = fs::weakly_canonical(fs::absolute(named), failed);
   if (!folder.has_filename()) folder = folder.parent_path();
   if (failed) return about("--out", {ErrorCode::kInvalidArgument, failed.message()});
   if (fs::exists(folder, failed) && !fs::is_empty(folder, failed)) {

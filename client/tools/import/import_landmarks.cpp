@@ -8,6 +8,7 @@
 #include <numbers>
 
 #include "client/tools/import/import_case.hpp"
+#include "common/geometry/misplacement.hpp"
 #include "common/geometry/tet_locator.hpp"
 #include "common/io/landmarks/pair_file.hpp"
 #include "common/registration/fiducials.hpp"
@@ -75,10 +76,18 @@ Status check_place(const io::NamedPairs& pairs, const BrainModel& model, Landmar
     const double outside = brain.locate(pairs.first[i]).distance_mm;
     if (outside > kLargestOutside_mm) {
       const Vec3& at = pairs.first[i];
+      const std::string mistake =
+          geometry::likely_mistake(columns_of(pairs.first), [&](const Points& meant) {
+            for (const auto point : meant.colwise()) {
+              if (brain.locate(point).distance_mm > kLargestOutside_mm) return false;
+            }
+            return true;
+          });
       return invalid(fmt::format(
           "{} lies at ({:.1f}, {:.1f}, {:.1f}) before surgery, {:.0f} mm outside the brain of "
-          "case {}: must be within {:.0f} mm; is it mm RAS, and of this patient?",
-          called(pairs, i), at.x(), at.y(), at.z(), outside, model.case_id, kLargestOutside_mm));
+          "case {}: must be within {:.0f} mm{}",
+          called(pairs, i), at.x(), at.y(), at.z(), outside, model.case_id, kLargestOutside_mm,
+          mistake.empty() ? "; is it mm RAS, and of this patient?" : mistake));
     }
     if (outside <= 0.0) continue;
     ++report.outside;

@@ -60,6 +60,10 @@ class KeyWriter : public KeyWalker<KeyWriter> {
   void operator()(const Key& key, const std::vector<double>& value, const Limits&) {
     line(key, yaml_list(value));
   }
+  void operator()(const Key& key, const std::vector<int>& value, const Limits&) {
+    line(key, value.size() == 1 ? std::to_string(value[0])
+                                : fmt::format("[{}]", fmt::join(value, ", ")));
+  }
   void operator()(const Key& key, const std::string& value, Need = Need::kOptional) {
     line(key, quoted(value));
   }
@@ -155,7 +159,7 @@ Result<CaseInputs> load_case_inputs(const CaseConfig& config) {
     loader.load(config.brain, read_nifti, inputs.brain);
   }
   if (const auto* label = std::get_if<TumourLabel>(&config.tumour)) {
-    const LabelChoice choice{label->segment.value_or(""), label->label};
+    const LabelChoice choice{label->segment.value_or(""), label->labels.front()};
     const auto read = [&](const fs::path& path) { return read_label_map(path, choice); };
     loader.load(label->path, read, inputs.tumour_labels);
   } else if (const auto* surface = std::get_if<TumourSurfaceFile>(&config.tumour)) {

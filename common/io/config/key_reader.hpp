@@ -34,6 +34,9 @@ class KeyReader {
   void operator()(const Key& key, std::vector<double>& value, const Limits&) {
     here_->numbers(key.name, value);
   }
+  void operator()(const Key& key, std::vector<int>& value, const Limits&) {
+    here_->integers(key.name, value);
+  }
   void operator()(const Key& key, std::string& value, Need need = Need::kOptional) {
     here_->text(key.name, value, presence(need));
   }

@@ -75,7 +75,7 @@ TEST(Refusals, FilesThatWereNotRead) {
   inputs = box_case();
   inputs.config.contact.skull_file = "skull.stl";
   expect_refused(inputs, ErrorCode::kInvalidArgument, {"contact.skull_file = 'skull.stl'"});
-  inputs.config.tumour = TumourLabel{"labels.nii", 1};
+  inputs.config.tumour = TumourLabel{"labels.nii", {1}};
   expect_refused(inputs, ErrorCode::kInvalidArgument, {"tumour.label_volume.file"});
   inputs.config.tumour = TumourSurfaceFile{"tumour.stl"};
   expect_refused(inputs, ErrorCode::kInvalidArgument, {"tumour.surface.file"});
@@ -111,18 +111,21 @@ TEST(Refusals, ATumourOutsideTheBrain) {
 
 TEST(Refusals, ALabelThatNoVoxelHas) {
   CaseInputs inputs = box_case();
-  inputs.config.tumour = TumourLabel{"labels.nii", 4};
+  inputs.config.tumour = TumourLabel{"labels.nii", {4}};
   inputs.tumour_labels = geometry::balls::binary_balls(
       geometry::balls::empty_image(9, kBallCentre, Mat3::Identity()), {{kBallCentre, 3.0}});
-  expect_refused(inputs, ErrorCode::kEmptySet, {"tumour.label_volume.label = 4", "'labels.nii'"});
+  expect_refused(
+      inputs, ErrorCode::kEmptySet,
+      {"tumour.label_volume.file = 'labels.nii'", "label = 4", "there are: 1 (0.09 cc)"});
 }
 
 TEST(Refusals, ALabelTooSmallForASurface) {
   CaseInputs inputs = box_case();
-  inputs.config.tumour = TumourLabel{"labels.nii", 1};
+  inputs.config.tumour = TumourLabel{"labels.nii", {1}};
   inputs.tumour_labels = geometry::balls::empty_image(9, kBallCentre, Mat3::Identity());
   inputs.tumour_labels->values[364] = 1.0f;  // one voxel, smoothed away
-  expect_refused(inputs, ErrorCode::kEmptySet, {"tumour.label_volume.label = 1", "too small"});
+  expect_refused(inputs, ErrorCode::kEmptySet,
+                 {"tumour.label_volume.file = 'labels.nii'", "too small"});
 }
 
 TEST(Refusals, ATumourSurfaceThatIsNotClosedOrNotWhole) {
@@ -141,6 +144,42 @@ TEST(Refusals, ATumourSurfaceThatIsNotClosedOrNotWhole) {
   expect_refused(inputs, ErrorCode::kNotFinite, {"not finite"});
   inputs.tumour_surface = TriangleSurface{};
   expect_refused(inputs, ErrorCode::kEmptySet, {"no triangle"});
+}
+
+TEST(Refusals, ATumourSurfaceInMetresOrLps) {
+  CaseInputs inputs = box_case();
+  inputs.config.tumour = TumourSurfaceFile{"tumour.stl"};
+  inputs.tumour_surface = geometry::ellipsoid_surface(kBallCentre, Vec3(9, 9, 9), 3.0);
+  inputs.tumour_surface->vertices *= 1e-3;
+  expect_refused(inputs, ErrorCode::kInvalidArgument,
+                 {"tumour.surface.file = 'tumour.stl'", "extent 0.01", "metres"});
+  inputs.tumour_surface =
+      geometry::ellipsoid_surface(kBallCentre + Vec3(33, 0, 0), Vec3(5, 5, 5), 3.0);
+  inputs.tumour_surface->vertices.topRows<2>() *= -1.0;
+  expect_refused(inputs, ErrorCode::kInvalidArgument, {"lie outside the brain", "in LPS instead"});
+}
+
+TEST(Refusals, ASkullThatIsNotTheBrains) {
+  CaseInputs inputs = ball_case();
+  inputs.config.contact.skull_file = "skull.stl";
+  const auto skull = [](double radius, const Vec3& at = kBallCentre) {
+    return geometry::ellipsoid_surface(at, Vec3::Constant(radius), 8.0);
+  };
+  const std::string key = "contact.skull_file = 'skull.stl'";
+  inputs.skull = skull(53);
+  inputs.skull->vertices *= 1e-3;
+  expect_refused(inputs, ErrorCode::kInvalidArgument, {key, "skull extent 0.10", "metres"});
+  inputs.skull = skull(53);
+  for (int t = 0; t < inputs.skull->num_triangles() / 2; ++t)
+    std::swap(inputs.skull->triangles(0, t), inputs.skull->triangles(1, t));
+  expect_refused(inputs, ErrorCode::kInvalidArgument, {key, "turned inside out"});
+  inputs.skull = skull(80);
+  expect_refused(inputs, ErrorCode::kInvalidArgument, {key, "mm from the brain", "at most 15"});
+  inputs.skull = skull(44);
+  expect_refused(inputs, ErrorCode::kInvalidArgument, {key, "stand outside of it, by up to"});
+  inputs.skull = skull(53);
+  inputs.skull->vertices.topRows<2>() *= -1.0;
+  expect_refused(inputs, ErrorCode::kInvalidArgument, {key, "in LPS instead of RAS?"});
 }
 
 TEST(Refusals, ACraniotomyFarFromTheBrain) {

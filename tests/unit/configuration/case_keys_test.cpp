@@ -109,7 +109,7 @@ TEST(CaseKeys, FilesAreNamedByTheirKeys) {
   CaseConfig config;
   config.mri = "t1.nii";
   config.brain = "mask.nii";
-  config.tumour = TumourLabel{"labels.nii", 2};
+  config.tumour = TumourLabel{"labels.nii", {2}};
   config.contact.skull_file = "skull.stl";
   const auto pairs = [](const std::vector<NamedFile>& files) {
     std::vector<std::pair<std::string, std::string>> list;

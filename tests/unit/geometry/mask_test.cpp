@@ -69,6 +69,18 @@ std::vector<int> breadth_first(const VoxelImage& image, const std::vector<char>&
   return label;
 }
 
+TEST(MaskParts, AreNumberedFromTheLargest) {
+  VoxelImage image;
+  image.dims = {7, 1, 2};
+  image.values = {1, 0, 2, 3, 0, 0, 1,  //
+                  0, 0, 0, 4, 0, 0, -1};
+  const MaskParts parts = mask_parts(image);
+  EXPECT_EQ(parts.voxels, (std::vector<std::size_t>{3, 1, 1}));
+  EXPECT_EQ(parts.part_of_voxel,
+            (std::vector<std::int32_t>{1, -1, 0, 0, -1, -1, 2, -1, -1, -1, 0, -1, -1, -1}));
+  EXPECT_TRUE(mask_parts(VoxelImage{}).voxels.empty());
+}
+
 // largest_component by definition, slowly.
 std::vector<float> largest_component_by_definition(const VoxelImage& image) {
   std::vector<char> member(image.values.size());

@@ -165,6 +165,19 @@ TEST(CheckMesh, CountsUnusedNodes) {
   expect_refused(mesh, ErrorCode::kDegenerateMesh, "2 unused nodes, the first is node 64");
 }
 
+TEST(CheckMesh, TissueMustNotCountTwice) {
+  TetMesh twice = good_mesh();
+  const int count = twice.num_tets();
+  twice.tets.conservativeResize(4, count + 1);
+  twice.tets.col(count) = twice.tets.col(5)(Eigen::Vector4i(1, 2, 0, 3));
+  expect_refused(twice, ErrorCode::kDegenerateMesh,
+                 "tetrahedra 5 and " + std::to_string(count) + " have the same four nodes");
+  TetMesh overlapping = joined_by(3);
+  overlapping.nodes.col(4) = overlapping.nodes.col(2) * 0.9;
+  overlapping.tets.col(1) = Eigen::Vector4i(0, 3, 1, 4);
+  expect_refused(overlapping, ErrorCode::kDegenerateMesh, "tetrahedra 0 and 1 overlap");
+}
+
 TEST(CheckMesh, PartsMustBeJoinedByFaces) {
   EXPECT_TRUE(check_mesh(joined_by(3)));
   for (const int nodes : {0, 1, 2})

@@ -169,6 +169,8 @@ TEST(IsClosed, NoticesHolesAndTurnedTriangles) {
   TriangleSurface turned = box;
   std::swap(turned.triangles(0, 5), turned.triangles(1, 5));
   EXPECT_FALSE(is_closed(turned));
+  EXPECT_EQ(turned_edges(turned), 3);
+  EXPECT_EQ(turned_edges(box), 0);
   TriangleSurface doubled = box;
   doubled.triangles.conservativeResize(3, box.num_triangles() + 1);
   doubled.triangles.col(box.num_triangles()) = box.triangles.col(0);

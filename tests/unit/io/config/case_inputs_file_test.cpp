@@ -60,10 +60,10 @@ TEST_F(CaseInputsFile, ASegmentOfASegmentationIsTheTumour) {
                   "Segment0_Name:=Brain\nSegment0_LabelValue:=1\n"
                   "Segment1_Name:=Tumour\nSegment1_LabelValue:=2\n\n") +
           "\1\2");
-  config_.tumour = TumourLabel{file, 5, "Tumour"};
+  config_.tumour = TumourLabel{file, {5}, "Tumour"};
   const auto inputs = value_or_fail(load_case_inputs(config_));
   EXPECT_THAT(inputs.tumour_labels.value().values, testing::ElementsAre(0, 5));
-  config_.tumour = TumourLabel{file, 5};
+  config_.tumour = TumourLabel{file, {5}};
   expect_blame(ErrorCode::kInvalidArgument, "tumour.label_volume.file", "\"Brain\", \"Tumour\"");
 }
 
@@ -75,7 +75,7 @@ TEST_F(CaseInputsFile, MissingFilesAreBlamedOnTheirKeys) {
   expect_blame(ErrorCode::kNotFound, "contact.skull_file", "no_skull.stl: no such file");
   config_.tumour = TumourSurfaceFile{folder_ / "no_tumour.stl"};
   expect_blame(ErrorCode::kNotFound, "tumour.surface.file", "no_tumour.stl: no such file");
-  config_.tumour = TumourLabel{folder_ / "no_labels.nii", 1};
+  config_.tumour = TumourLabel{folder_ / "no_labels.nii", {1}};
   expect_blame(ErrorCode::kNotFound, "tumour.label_volume.file", "no_labels.nii: no such file");
   config_.mesh = MeshFile{folder_ / "no_mesh.vtu"};
   expect_blame(ErrorCode::kNotFound, "mesh.file", "no_mesh.vtu: no such file");

@@ -106,7 +106,7 @@ TEST(CaseFile, EveryKeyArrivesInItsField) {
   EXPECT_EQ(generate.craniotomy_margin_mm, 12);
   EXPECT_EQ(generate.smoothing_mm, 1.5);
   EXPECT_EQ(std::get<TumourLabel>(read.tumour).path, "/cases/labels.nii");
-  EXPECT_EQ(std::get<TumourLabel>(read.tumour).label, 7);
+  EXPECT_EQ(std::get<TumourLabel>(read.tumour).labels, std::vector<int>{7});
   EXPECT_EQ(std::get<TumourLabel>(read.tumour).segment, std::nullopt);
   EXPECT_EQ(read.craniotomy.centre_mm, Vec3(7, 8, 9));
   EXPECT_EQ(read.craniotomy.long_axis_mm, 30);
@@ -254,7 +254,7 @@ TEST(CaseFile, BadFilesAreRefusedInOneLineThatNamesFileLineKeyAndValue) {
        {"sparse_points: 100", "sparse_points: 100.5",
         ":32: inversion.sparse_points = 100.5: must be an integer"},
        {"label: 7", "label: 99999999999",
-        ":12: tumour.label_volume.label = 99999999999: must be an integer"},
+        ":12: tumour.label_volume.label = 99999999999: must be an integer or a list of integers"},
        {"[7, 8, 9]", "[7, 8]",
         ":14: craniotomy.centre_mm = [7, 8]: must be a list of three finite numbers"},
        {"[7, 8, 9]", "[7, 8, 9, 10]", ":14: craniotomy.centre_mm = [7, 8, 9, 10]: must be"},
