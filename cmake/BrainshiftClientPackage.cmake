@@ -17,7 +17,7 @@ foreach(folder core values)
     FILES_MATCHING PATTERN "*.hpp")
 endforeach()
 # Not those that only common/wire itself may include: they show Protobuf's generated code.
-foreach(name convert frame names published_update report text)
+foreach(name convert frame names published_update report)
   install(FILES ${CMAKE_SOURCE_DIR}/common/wire/${name}.hpp DESTINATION include/brainshift/common/wire COMPONENT client)
 endforeach()
 install(FILES ${CMAKE_SOURCE_DIR}/client/lib/client.hpp ${CMAKE_SOURCE_DIR}/client/lib/client_keys.hpp

@@ -127,8 +127,8 @@ struct PriorConfig {
   double opening_pressure_sd_pa = 930.0;  // pull and pressure at the craniotomy
   // Method condensed: the strength of each part is estimated from the data of an update.
   bool estimate_scales = true;
-  // Weight of the hypothesis that every part is as strong as before the data, whatever they say about
-  // single ones: they see a part of the brain, and it keeps what they cannot see.
+  // Weight of the hypothesis that every part is as strong as before the data, whatever they say
+  // about single ones: they see a part of the brain, and it keeps what they cannot see.
   double broad_weight = 0.1;
 };
 // Greatest strength of a part of the prior, in units of the case's standard deviation.

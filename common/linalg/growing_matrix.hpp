@@ -43,8 +43,8 @@ class Growing : public Eigen::Map<Plain> {
   std::vector<double> storage_;
 };
 
-// Another size, entries undefined. What there was is freed when the new memory is there, not before as
-// by resize(): without memory the matrix stays as it was.
+// Another size, entries undefined. What there was is freed when the new memory is there, not before
+// as by resize(): without memory the matrix stays as it was.
 template <typename Plain>
 void replace(Plain& matrix, Eigen::Index rows, Eigen::Index cols = 1) {
   Plain other(rows, cols);

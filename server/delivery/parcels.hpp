@@ -7,11 +7,11 @@
 //
 // With a tolerance t, and u what the update says of a node, h what the viewer holds of it: the node
 // travels when |u - h| > t, when the standard deviations differ by more than t, or what is known by
-// more than kKnownTolerance. Both ends compute with the same 32-bit floats and bytes, so that what a
-// viewer holds is known here exactly. The whole choice travels, and replaces what is held, when the
-// viewer holds nothing of this session, when most of it changed, and when standard deviations, or
-// what is known, come or go. An update that is not usable travels
-// with the whole choice; nobody holds it.
+// more than kKnownTolerance. Both ends compute with the same 32-bit floats and bytes, so that what
+// a viewer holds is known here exactly. The whole choice travels, and replaces what is held, when
+// the viewer holds nothing of this session, when most of it changed, and when standard deviations,
+// or what is known, come or go. An update that is not usable travels with the whole choice; nobody
+// holds it.
 //
 // Plain bookkeeping of the transport thread, of which a turn makes at most kMakesPerTurn parcels.
 #pragma once

@@ -63,7 +63,7 @@ def test_export_warps_the_mri_onto_its_own_grid(folder, export):
     assert dims == DIMS
     assert np.linalg.norm(to_ras - MRI_TO_RAS) <= 1e-6 * np.linalg.norm(MRI_TO_RAS)
     manifest = json.loads((folder / "out" / "export.json").read_text())
-    assert len(manifest["files"]) == 9
+    assert len(manifest["files"]) == 10
     for file in manifest["files"]:
         assert (folder / "out" / file["file"]).exists(), file
 

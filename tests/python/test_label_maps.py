@@ -35,7 +35,7 @@ def nifti(labels, affine):
     struct.pack_into("<i", header, 0, 348)
     struct.pack_into("<8h", header, 40, 3, *labels.shape, 1, 1, 1, 1)
     struct.pack_into("<2h", header, 70, 2, 8)  # uint8
-    struct.pack_into("<8f", header, 76, *[1.0] * 8)
+    struct.pack_into("<8f", header, 76, 1, *numpy.linalg.norm(affine[:3, :3], axis=0), 1, 1, 1, 1)
     struct.pack_into("<2f", header, 108, 352, 1)  # vox_offset, scl_slope
     header[123] = 2  # mm
     struct.pack_into("<h", header, 254, 1)  # sform_code

@@ -27,7 +27,8 @@ Result<io::ScalarVolume> warp_image(const VoxelImage& image, const io::Displacem
 //   vertices         x + u(x), RAS, mm
 //   displacement_mm  u(x), three components; moves undeformed to deformed
 //   sd_mm            standard deviation of u(x)
-//   known            how much the data say of it, 0 to 1; both are left out where the update has none
+//   known            how much the data say of it, 0 to 1; both are left out where the update has
+//   none
 struct DeformedSurface {
   TriangleSurface surface;
   std::vector<io::NodeField> vertex_fields;

@@ -41,8 +41,8 @@ Result<std::string> records_csv(const io::SurgeryFile& file, const std::filesyst
 
 // For every usable update a file `<stem>-<sequence>.vtu` with the point arrays displacement and,
 // where the update has them, sd_mm (both mm, RAS, undeformed to deformed) and known (no unit), and
-// `<stem>.pvd`, which lists them by their time in s. model: recorded_model(). The folder is made if it does not exist.
-// Gives the number of fields. kEmptySet without a usable update; kWriteFailed.
+// `<stem>.pvd`, which lists them by their time in s. model: recorded_model(). The folder is made if
+// it does not exist. Gives the number of fields. kEmptySet without a usable update; kWriteFailed.
 Result<int> write_field_series(const io::SurgeryFile& file, const std::filesystem::path& path,
                                const BrainModel& model, const std::filesystem::path& folder);
 

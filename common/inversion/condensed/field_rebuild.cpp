@@ -333,15 +333,18 @@ void FieldRebuild::known(ThreadTeam& team, const linalg::blas::In<double>& expla
   Eigen::Map<Eigen::MatrixXf> x(explained_.get(), r, k);
   x = explained.transpose().cast<float>();
   Eigen::Map<Eigen::MatrixXf> seen(seen_.get(), conditioned_.rows(), k);
-  const Eigen::VectorXf squares = variances.cast<float>();
+  prior_squares_ = variances.cast<float>();
   team.split(static_cast<long>(operators_.control.size()), [&](long begin, long end) {
     const Eigen::Index first = 3 * begin, rows = 3 * (end - begin);
     const auto v = conditioned_.middleRows(first, rows);
     if (k > 0) linalg::blas::multiply(1.0F, v, x, 0.0F, seen.middleRows(first, rows));
     for (long i = begin; i < end; ++i) {
-      const double prior = static_cast<double>(
-          (conditioned_.middleRows<3>(3 * i).array().square().matrix() * squares).sum());
-      const double all = prior + 3.0 * operators_.truncated_variance_mm2.row(i).sum();
+      float prior = 0.0F;
+      for (long row = 3 * i; row < 3 * i + 3; ++row) {
+        prior += conditioned_.row(row).cwiseAbs2().dot(prior_squares_);
+      }
+      const double all =
+          static_cast<double>(prior) + 3.0 * operators_.truncated_variance_mm2.row(i).sum();
       const double taken = static_cast<double>(seen.middleRows<3>(3 * i).squaredNorm());
       control_known_[i] = all > 0.0 ? std::clamp(taken / all, 0.0, 1.0) : 0.0;
     }

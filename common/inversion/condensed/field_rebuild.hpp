@@ -81,8 +81,8 @@ class FieldRebuild {
                           const linalg::blas::In<double>& covariance_factor,
                           const RemainderVariances& left_out, VecX& sd);
   // How much of a node's prior variance the data took away, under the broad hypothesis
-  // (prior_strengths.hpp): 0 none, 1 all. explained: X, k x r, variances: S^2, r, with Cov(z) = S^2 -
-  // X^T X. For the contact of the last standard_deviation(). known: n.
+  // (prior_strengths.hpp): 0 none, 1 all. explained: X, k x r, variances: S^2, r, with Cov(z) = S^2
+  // - X^T X. For the contact of the last standard_deviation(). known: n.
   void known(ThreadTeam& team, const linalg::blas::In<double>& explained, const VecX& variances,
              VecX& known);
 
@@ -112,6 +112,7 @@ class FieldRebuild {
   std::vector<char> has_block_;
   // Control nodes: rows of U and G, V, and what a set needs of them.
   Eigen::MatrixXf control_modes_, control_contact_, response_, factor_, conditioned_, spread_;
+  Eigen::VectorXf prior_squares_;              // variances of the modes, r
   std::unique_ptr<float[]> explained_, seen_;  // X^T, and V X^T
   std::unique_ptr<float[]> contact_storage_;
   VecX control_variance_, control_known_;

@@ -216,11 +216,12 @@ Status prior_modes(const PreparedModel& model, BlockRunner& runner, MatrixXf& mo
     return {};
   });
   if (!status) return status;
-  status = runner.run("prior modes", tested_far, [&](int first, int count, auto& own) -> Status {
-    omega_far.write(first, count, rows, own.loads);
-    if (auto solved = own.solver.solve(own.loads, own.solved); !solved) return solved;
-    return sketch(kFarField, first, count, own);
-  });
+  if (tested_far > 0)
+    status = runner.run("far modes", tested_far, [&](int first, int count, auto& own) -> Status {
+      omega_far.write(first, count, rows, own.loads);
+      if (auto solved = own.solver.solve(own.loads, own.solved); !solved) return solved;
+      return sketch(kFarField, first, count, own);
+    });
   if (!status) return status;
   result.part_columns = prior.columns_of_part();
   for (std::size_t g = 0; g < kept.size(); ++g) {

@@ -31,8 +31,8 @@ inline constexpr float kContactStep = 1.0F / 8388608;  // 2^-23
 inline constexpr float kModeStep = 1.0F / 33554432;    // 2^-25
 
 struct CondenseOptions {
-  Progress progress;     // stages "load modes", "prior modes", "uncertainty", "contact columns",
-                         // "compact columns"
+  Progress progress;     // stages "load modes", "prior modes", "far modes", "uncertainty",
+                         // "contact columns", "compact columns"
   std::stop_token stop;  // checked between blocks
   BlockStore store;      // keeps nothing: G stays in memory
   int threads = 0;       // 0: as many as cores

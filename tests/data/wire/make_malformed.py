@@ -141,9 +141,9 @@ def encodings():
 
 
 def verdicts():
-    flag_sets = {"none": [], "1": [1], "1_7": [1, 7], "17": [17], "1_20": [1, 20], "0": [0], "8": [8], "16": [16], "21": [21],
+    flag_sets = {"none": [], "1": [1], "1_7": [1, 7], "17": [17], "1_20": [1, 20], "0": [0], "9": [9], "16": [16], "21": [21],
                  "1_1": [1, 1], "-1": [-1]}
-    known = set(range(1, 8)) | set(range(17, 21))
+    known = set(range(1, 9)) | set(range(17, 21))
     for quality in range(-1, 5):
         for name, flags in flag_sets.items():
             sound = set(flags) <= known and len(set(flags)) == len(flags)

@@ -204,6 +204,8 @@ std::vector<Fault> faults() {
        }},
       {QualityFlag::kIterationLimit, "limit",
        [](Estimate& e) { e.status = EstimateStatus::kIterationLimit; }},
+      {QualityFlag::kMostlyPrior, "at least 50 %",
+       [](Estimate& e) { e.region_known = std::nextafter(kLeastKnown, 0.0); }},
       {QualityFlag::kInvertedElements, "133, smallest volume ratio -0.25",
        [](Estimate& e) {
          e.inverted_elements = 133;
