@@ -29,6 +29,7 @@ from .programs import Failed, Programs
 
 BIDS_VERSION = "1.8.0"
 CASE_OWN = ("case_id", "images")
+NO_ESTIMATE = "no observation was answered with an estimate"  # of brainshift replay: the data are to blame
 NOT_KEPT = ("trace", "hypotheses", "case_file", "surgery_file", "field_file")  # paths and inner steps
 
 
@@ -200,17 +201,19 @@ def _play(request: Request, surgeries: list[Surgery], results: dict[str, Path], 
         for surgery in missing:
             done = work / surgery.tag
             if not done.is_dir():
-                part = work / f"{surgery.tag}.part"
-                remove(part)
-                part.mkdir()
+                part = Path(f"{surgery.tag}.part")  # in the work folder, where programs run
+                remove(work / part)
+                (work / part).mkdir()
                 try:
                     recorded = _recorded(request, surgery, part, work, held)
                     call(programs.tool, "replay", recorded, "--endpoint", endpoint, "--boundary", request.boundary,
                          "--method", request.method, "--report", part / "report.json", folder=work, held=held)
-                except Refused as refused:
-                    problems.append(f"{surgery.name}: {refused}")
+                except (Refused, Failed) as problem:
+                    if isinstance(problem, Failed) and NO_ESTIMATE not in str(problem):
+                        raise
+                    problems.append(f"{surgery.name}: {problem}")
                     continue
-                os.replace(part, done)
+                os.replace(work / part, done)
             if results[surgery.tag].exists():
                 continue  # played again for the pictures of the report
             runs = [{k: v for k, v in r.items() if k not in NOT_KEPT} for r in read_json(done / "report.json")]
@@ -232,7 +235,7 @@ def _recorded(request: Request, surgery: Surgery, part: Path, work: Path, held: 
         options = [text for pair in surgery.recording.options.items() for text in (pair[0], pair[1].resolve())]
         request.programs.call(tool, "import", *options, "--model", "model.h5", "--out", target, folder=work, held=held)
     else:
-        copy(surgery.recording.file, target)
+        copy(surgery.recording.file, work / target)
     return target
 
 
