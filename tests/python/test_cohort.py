@@ -439,3 +439,48 @@ def test_a_coverage_nearer_to_its_level_is_better():
 
 def _coverage(value):
     return {**{m.column: None for m in compare.COMPARED if m.column != "tumour_error_mm"}, "coverage_90": value}
+
+
+# Datasets of other people's making
+
+def example(name, folder, images):
+    """The tree of a public dataset; images are empty files as there, or small heads."""
+    lines = (pathlib.Path(__file__).parent / "bids_examples.txt").read_text().splitlines()
+    for line in (line for line in lines if line.startswith(name + "/")):
+        file = folder / line
+        file.parent.mkdir(parents=True, exist_ok=True)
+        if file.name == "dataset_description.json":
+            bids_tree.dataset(file.parent)
+        elif images and file.name.endswith((".nii", ".nii.gz")):
+            bids_tree.put(file, bids_tree.head().astype("uint8"))
+        else:
+            file.touch()
+    return folder / name
+
+
+# Units that run, and what the lines of the others say.
+EXAMPLES = {"ds000001-fmriprep": (1, 0, ""), "ds114": (0, 4, "no brain"), "synthetic": (0, 2, "no brain"),
+            "ds000117": (0, 1, "no brain"), "atlas-4S": (0, 1, "no brain")}
+
+
+@pytest.mark.parametrize("name", EXAMPLES)
+def test_a_public_layout_runs_or_has_one_line_per_subject(programs, tmp_path, name):
+    run, lines, part = EXAMPLES[name]
+    for images in (False, True):
+        bids = example(name, tmp_path / str(images), images)
+        out = bids / "derivatives" / "brainshift"
+        good = run if images else 0
+        done = app(bids, out, "participant", "--programs", programs, "--simulated-tumour", expect=0 if good and not lines else 2)
+        said = done.stderr.splitlines()
+        assert len(done.stdout.splitlines()) == good and len(said) == lines + run - good
+        assert all(line.startswith("brainshift-bids: sub-") and (part if images else "") in line for line in said)
+
+
+def test_masks_that_are_put_beside_a_public_dataset_make_it_run(programs, tmp_path):
+    bids = example("ds114", tmp_path, images=True)
+    for image in bids.glob("sub-*/ses-*/anat/*_T1w.nii.gz"):
+        mask = bids / "derivatives" / "masks" / image.relative_to(bids)
+        bids_tree.put(mask.with_name(image.name.replace("T1w", "desc-brain_mask")), bids_tree.head().astype("uint8"))
+    out = tmp_path / "out"
+    app(bids, out, "participant", "--programs", programs, "--simulated-tumour")
+    assert "4 surgeries of 2 subjects, 0 left out" in app(bids, out, "group").stdout

@@ -114,7 +114,7 @@ def with_anatomy(bids: Path, found: list[Unit]) -> list[Unit]:
 
 def images(bids: Path, unit: Unit) -> list[Path]:
     return sorted(file for file in (bids / unit.folder / "anat").glob("*_T1w.nii*")
-                  if file.name.endswith((".nii", ".nii.gz")) and "space" not in entities(file))
+                  if file.name.endswith((".nii", ".nii.gz")) and entities(file).get("space", "") in OWN_SPACES)
 
 
 def _belongs(file: Path, image: dict[str, str]) -> bool:
@@ -174,8 +174,11 @@ def inputs(bids: Path, unit: Unit, output: Path, filters: dict[str, str]) -> Inp
         where = bids / unit.folder / "anat"
         raise Refused(f"no {unit.folder / 'anat'}/*_T1w.nii[.gz]" + ("" if where.is_dir() else " (no folder anat)"))
     files = [file for file in _beside(bids, unit, output) if passes(file)]
-    masks = [f for f in files if re.search(r"_mask\.nii(\.gz)?$", f.name) and entities(f).get("desc", "") == "brain"]
-    maps = [f for f in files if re.search(r"_dseg\.nii(\.gz)?$", f.name)]
+    # Of the head's own images: those of folders func, dwi and perf and regions of an atlas are others' masks.
+    anatomy = [f for f in files if f.parent.name == "anat" and "atlas" not in entities(f)]
+    masks = [f for f in anatomy if re.search(r"_mask\.nii(\.gz)?$", f.name)
+             and "brain" in (entities(f).get("desc"), entities(f).get("label"))]
+    maps = [f for f in anatomy if re.search(r"_dseg\.nii(\.gz)?$", f.name)]
     if len(t1w) > 1:
         meant = [image for image in t1w if any(
             {k: v for k, v in entities(file).items() if k not in ("desc", "suffix", "space", "res", "label")}
@@ -199,7 +202,7 @@ def inputs(bids: Path, unit: Unit, output: Path, filters: dict[str, str]) -> Inp
         raise Refused("no brain: neither *_desc-brain_mask.nii.gz nor *_dseg.nii.gz in the image's space, in the "
                       "subject's folder or in derivatives/*/")
 
-    lesions = [f for f in files if re.search(r"_(mask|roi)\.nii(\.gz)?$", f.name) and _belongs(f, about)
+    lesions = [f for f in anatomy if re.search(r"_(mask|roi)\.nii(\.gz)?$", f.name) and _belongs(f, about)
                and TUMOUR.search(entities(f).get("label", "") + "_" + entities(f).get("desc", ""))]
     tumour: Labels | None = None
     if lesions:
