@@ -34,7 +34,7 @@ def command(*arguments):
 
 
 def app(*arguments, expect=0):
-    done = subprocess.run(command(*arguments), capture_output=True, text=True, timeout=120)
+    done = subprocess.run(command(*arguments), capture_output=True, text=True, timeout=280)
     assert done.returncode == expect, done.stdout + done.stderr
     return done
 
