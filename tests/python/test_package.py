@@ -23,8 +23,10 @@ def test_the_wheel_holds_all_that_the_package_needs(tmp_path):
     with zipfile.ZipFile(wheel) as archive:
         archive.extractall(installed)
     assert (installed / "brainshift" / "py.typed").exists()
+    (entries,) = installed.glob("brainshift-*.dist-info/entry_points.txt")
+    assert "brainshift-bids = brainshift.cohort.command:main" in entries.read_text()
     environment["PYTHONPATH"] = str(installed)
-    used = subprocess.run([sys.executable, "-c", "import brainshift; print(brainshift.__file__)"], cwd=tmp_path,
+    used = subprocess.run([sys.executable, "-c", "import brainshift, brainshift.cohort.command; print(brainshift.__file__)"], cwd=tmp_path,
                           env=environment, capture_output=True, text=True, timeout=60)
     assert used.stdout.startswith(str(installed)), used.stderr
 
