@@ -5,6 +5,7 @@
 
 const SILENCE_MS = 700;
 const LATE_MS = 700;
+const SWAP_MS = 500;  // a field that is announced is fetched and drawn within this, or the old one goes grey
 const PX_PER_MM = 1.5;
 const MARGIN_MM = 4;
 // "across" runs along the axis from the picture's right edge to its left (radiological view).
@@ -29,6 +30,7 @@ let earliest = Infinity; // smallest of (arrival - clock of the publisher): an e
 let late = 0;            // how much longer than that the newest was on its way
 let model = null;        // { model_id, grids, inside, mri, tumour }
 let field = null;        // { of, u, sd, known, vertices }
+let announcedAt = 0;     // when the newest event's field was first heard of
 let history = { of: "", count: -1, points: [] };
 let cross = [0, 0, 0];   // p of the three slices
 let loading = false;
@@ -127,10 +129,13 @@ async function load() {
 function listen() {
   const events = new EventSource("events");
   events.onmessage = (event) => {
+    const before = state?.field, heardBefore = heardAt;
     state = JSON.parse(event.data);
     heardAt = performance.now();
+    if (state.field !== before) announcedAt = heardAt;
     const way = heardAt - state.clock_ms;
-    earliest = Math.min(earliest, way);
+    // Two clocks, as through a tunnel, drift apart by less than 200 us a second.
+    earliest = Math.min(Number.isFinite(heardBefore) ? earliest + 2e-4 * (heardAt - heardBefore) : way, way);
     late = way - earliest;
     judge();
     load();
@@ -146,7 +151,7 @@ function standing() {
     return { show: "grey", why: state ? `no word from brainshift view for ${(Math.max(silence, late) / 1000).toFixed(1)} s`
                                       : "waiting for brainshift view" };
   }
-  const fits = field && field.of === state.field && model.model_id === state.model_id;
+  const fits = drawable() && (field.of === state.field || performance.now() - announcedAt < SWAP_MS);
   switch (state.currency) {
     case "current": case "aged": case "superseded": return { show: fits ? "live" : "grey", why: fits ? state.reason : "its field is on its way" };
     case "none": case "expired": return { show: "none", why: state.reason };
@@ -227,19 +232,30 @@ function around(grid, x, y, z, visit) {
   visit(at + nxy + nx, (1 - a) * b * c); visit(at + nxy + nx + 1, a * b * c);
   return true;
 }
+// The same for the vectors of a field, written out: it is called a million times per picture.
 function displacement(of, x, y, z, u) {
+  const { dims, origin_mm: o, spacing_mm: s } = model.field, nx = 3 * dims[0], nxy = nx * dims[1];
+  const fx = (x - o[0]) / s, fy = (y - o[1]) / s, fz = (z - o[2]) / s;
+  const i = Math.floor(fx), j = Math.floor(fy), k = Math.floor(fz);
   u[0] = u[1] = u[2] = 0;
-  around(model.field, x, y, z, (v, w) => {
-    u[0] += w * of.u[3 * v]; u[1] += w * of.u[3 * v + 1]; u[2] += w * of.u[3 * v + 2];
-  });
+  if (!(i >= 0 && j >= 0 && k >= 0 && i < dims[0] - 1 && j < dims[1] - 1 && k < dims[2] - 1)) return;
+  const a = fx - i, b = fy - j, c = fz - k, at = 3 * i + nx * j + nxy * k, values = of.u;
+  const w00 = (1 - b) * (1 - c), w10 = b * (1 - c), w01 = (1 - b) * c, w11 = b * c;
+  for (let d = 0; d < 3; ++d) {
+    const v = at + d;
+    u[d] = (1 - a) * (w00 * values[v] + w10 * values[v + nx] + w01 * values[v + nxy] + w11 * values[v + nxy + nx]) +
+           a * (w00 * values[v + 3] + w10 * values[v + nx + 3] + w01 * values[v + nxy + 3] + w11 * values[v + nxy + nx + 3]);
+  }
 }
-// Where p was in the MRI: x = p - u(x), by repetition; the field's strain is well below 1.
-function origin(of, p, x) {
-  const u = [0, 0, 0];
-  x[0] = p[0]; x[1] = p[1]; x[2] = p[2];
-  for (let i = 0; of && i < 4; ++i) {
-    displacement(of, x[0], x[1], x[2], u);
+// Where p was in the MRI: x = p - u(x), by repetition from u, which becomes u(x). A brain's strain is well below 1.
+function origin(of, p, x, u = [0, 0, 0]) {
+  if (!of) u[0] = u[1] = u[2] = 0;
+  for (let turn = 0; turn < 8; ++turn) {
     for (let c = 0; c < 3; ++c) x[c] = p[c] - u[c];
+    if (!of) return;
+    const [a, b, c] = u;
+    displacement(of, x[0], x[1], x[2], u);
+    if (Math.abs(a - u[0]) + Math.abs(b - u[1]) + Math.abs(c - u[2]) < 0.01) return;
   }
 }
 function grey(x) {
@@ -278,8 +294,11 @@ function toPlace(plane, px, py) {
   p[plane.up] = model.high[plane.up] - py / PX_PER_MM;
   return p;
 }
-// The field that may be drawn: none once it has expired or its session has ended.
-const drawable = () => (field && standing().show !== "none" && field.of === state.field ? field : null);
+// The field that may be drawn: of the running session, and none once it has expired.
+function drawable() {
+  const over = !field || !state || ["none", "expired"].includes(state.currency);
+  return over || model.model_id !== state.model_id || !field.of.startsWith(state.session + ".") ? null : field;
+}
 
 function draw() {
   if (!model) return;
@@ -293,11 +312,12 @@ function draw() {
 function drawSlice(canvas, plane, of, map, now) {
   const context = canvas.getContext("2d"), { width, height } = canvas;
   const image = context.createImageData(width, height), data = image.data;
-  const x = [0, 0, 0], table = MAPS[map]?.table, most = of?.most[map];
+  const p = [...cross], x = [0, 0, 0], u = [0, 0, 0], table = MAPS[map]?.table, most = of?.most[map];
   for (let py = 0, at = 0; py < height; ++py) {
+    p[plane.up] = model.high[plane.up] - (py + 0.5) / PX_PER_MM;
     for (let px = 0; px < width; ++px, at += 4) {
-      const p = toPlace(plane, px + 0.5, py + 0.5);
-      origin(now ? of : null, p, x);
+      p[plane.across] = model.high[plane.across] - (px + 0.5) / PX_PER_MM;
+      origin(now ? of : null, p, x, u);  // from the neighbour's displacement
       const level = grey(x);
       data[at] = data[at + 1] = data[at + 2] = level;
       data[at + 3] = 255;
@@ -465,7 +485,7 @@ function drawStrip(canvas, strip, label, marked) {
   const context = canvas.getContext("2d"), points = history.points, n = points.length;
   context.scale(ratio, ratio);
   const css = getComputedStyle(document.body), has = (p) => strip.value(p) != null;
-  const top = Math.max(0.1, ...points.filter(has).map((p) => strip.value(p) + (strip.sd(p) ?? 0)));
+  const top = 1.15 * Math.max(0.1, ...points.filter(has).map((p) => strip.value(p) + (strip.sd(p) ?? 0)));
   const y = (v) => height - 14 - ((height - 18) * v) / top;
   context.strokeStyle = css.getPropertyValue("--rule");
   context.beginPath();

@@ -95,8 +95,8 @@ class Viewer {
     auto reporter = Client::connect(options_.endpoint,
                                     {.request_timeout = kReportTimeout, .keys = options_.keys});
     if (!reporter) return tl::unexpected(reporter.error());
-    // Asked first: a model that is fetched from a daemon that is not there takes long to fail.
-    if (const auto there = client->status(); !there) return tl::unexpected(there.error());
+    // Asked first, and soon told: there is a daemon from which a model may be fetched.
+    if (const auto there = reporter->status(); !there) return tl::unexpected(there.error());
     if (Status ok = load_model(*client); !ok) return ok;
     if (Status ok = client->subscribe(); !ok) return ok;
     told_.clear();
