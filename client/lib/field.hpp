@@ -17,7 +17,7 @@
 //
 // Coordinates are patient RAS, mm; points 3 x m, a column per point. A mesh of 130,000 tetrahedra
 // is made ready in some tens of milliseconds, the first undeformed() of an update takes as long,
-// a point less than a microsecond. Whether the field may be shown at all is Client::field_status()'s
+// a point about a microsecond. Whether the field may be shown at all is for Client::field_status()
 // to say: a Field keeps the values of its update, and does not age.
 #pragma once
 
@@ -34,7 +34,7 @@ namespace brainshift::client {
 enum class Where : std::uint8_t {
   kInside,       // there is a value
   kOutside,      // outside the mesh, or not a number
-  kNotReceived,  // inside the mesh, but the update has no value there: a viewer's part leaves it out
+  kNotReceived,  // inside the mesh, but a viewer's part leaves out a value there
 };
 
 struct FieldValues {

@@ -1,8 +1,9 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // HttpServer: hands pages and a stream of events to browsers of this computer, and takes nothing.
 //
-// Only GET is answered (405). A Host header that is no name of this computer is refused (403): a page
-// of another site whose name is made to lead here (DNS rebinding) would read the patient's data.
+// Only GET is answered (405). A Host header that is no name of this computer is refused (403): a
+// page of another site whose name is made to lead here (DNS rebinding) would read the patient's
+// data.
 // Nothing is cached, framed, or readable from another origin; the content may load nothing from
 // elsewhere (Content-Security-Policy). There is no encryption and there are no passwords: it
 // listens on loopback alone.

@@ -26,7 +26,8 @@ struct ViewOptions {
   std::optional<ClientKeys> keys = std::nullopt;
 };
 
-// Until `stopped`, which is asked several times a second. Waits for a daemon that is not there, or has no model yet.
+// Until `stopped`, which is asked several times a second. Waits for a daemon that is not there, or
+// has no model yet.
 // tell: sentences for people; the first names the page's address.
 // Errors: of the address (HttpServer::listen), of reading the model file and its MRI;
 // kInvalidArgument: the first model that the daemon serves is not that of the file.
