@@ -118,7 +118,7 @@ TEST(HttpServer, AStreamGetsTheNewestEventAndNoneTwice) {
   browser.send(kEvents);
   const std::string first = browser.read_until("data: two\n\n");
   EXPECT_THAT(first, HasSubstr("Content-Type: text/event-stream"));
-  EXPECT_THAT(first, Not(HasSubstr("one")));
+  EXPECT_THAT(first, Not(HasSubstr("data: one")));
   served.site.publish("three");
   const std::string all = browser.read_until("data: three\n\n");
   EXPECT_EQ(all.find("data: two"), all.rfind("data: two"));
@@ -154,7 +154,7 @@ TEST(HttpServer, EndsWhileStreamsAreOpen) {
   browser.send(kEvents);
   browser.read_until("\r\n\r\n");
   served.reset();
-  EXPECT_THAT(browser.read_until("never"), Not(HasSubstr("data:")));
+  EXPECT_THAT(browser.read_until("never"), Not(HasSubstr("data: ")));
 }
 
 TEST(HttpServer, RefusesEveryAddressButLoopback) {
