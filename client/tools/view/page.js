@@ -110,15 +110,19 @@ function greatest(made, n) {
 // One at a time; what has changed meanwhile is loaded after it.
 async function load() {
   if (loading || !state) return;
+  const newModel = state.model_id && model?.model_id !== state.model_id;
+  const newField = state.field && field?.of !== state.field;
+  const newHistory = state.model_id && (history.count !== state.history || history.of !== state.session);
+  if (!newModel && !newField && !newHistory) return;
   loading = true;
   try {
-    if (state.model_id && model?.model_id !== state.model_id) await loadModel();
-    if (model && state.model_id === model.model_id && state.field && field?.of !== state.field) await loadField();
-    if (history.count !== state.history || history.of !== state.session) {
+    if (newModel) await loadModel();
+    if (newField && state.model_id === model?.model_id) await loadField();
+    if (newHistory) {
       const count = state.history, answer = await get("history");
       history = { of: answer.headers.get("Of"), count, points: await answer.json() };
     }
-    draw();
+    if (newModel || newField) draw(); else drawStrips();
   } catch (error) {
     console.warn(String(error));  // the next event tries again
   } finally {

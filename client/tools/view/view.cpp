@@ -29,6 +29,7 @@ constexpr milliseconds kLook{50};
 constexpr milliseconds kSignOfLife{150};  // the page's patience is 700 ms
 constexpr milliseconds kModelTimeout{5000};
 constexpr milliseconds kReportTimeout{250};  // a frozen daemon must not keep the page waiting
+constexpr double kNoNews_ms = 90.0;
 constexpr double kReportEvery_s = 1.0;
 constexpr double kRatesOver_s = 10.0;
 constexpr double kOverdue_s = 1.0;  // a newer field that was announced
@@ -270,7 +271,14 @@ class Viewer {
     return std::chrono::duration<double, std::milli>(BootClock::now().time_since_epoch()).count();
   }
 
+  // At once when something has changed, else as a sign of life.
   void publish(const FieldStatus& status) {
+    std::string news =
+        fmt::format("{} {} {} {} {} {}", state_.session, state_.field, state_.history,
+                    state_.model_id, to_string(status.currency), status.reason);
+    if (news == news_ && since_published_.milliseconds() < kNoNews_ms) return;
+    news_ = std::move(news);
+    since_published_ = {};
     state_.status = status;
     site_.publish(to_json(state_, clock_ms()));
   }
@@ -288,6 +296,8 @@ class Viewer {
   std::vector<SourceSummary> used_;  // of the shown update
   // When (s) how many observations of a source had arrived.
   std::map<std::string, std::deque<std::pair<double, std::uint64_t>>> received_;
+  std::string news_;  // of the newest event
+  Stopwatch since_published_;
   Stopwatch since_report_;
   std::optional<Stopwatch> superseded_;
 };
