@@ -79,7 +79,7 @@ def browser(view, tmp_path_factory):
 
 def test_one_line_says_what_is_shown_and_that_it_is_recorded(browser, surgery):
     update = surgery[3]
-    assert re.match(rf"RECORDED · {update.quality.name}.* tumour moved \d+\.\d ± \d+\.\d mm$", browser.text("verdict"))
+    assert re.match(rf"RECORDED · {update.quality.name}.* tumour moved \d+\.\d+ ± \d+\.\d+ mm$", browser.text("verdict"))
     assert re.search(r"data .* s old · method condensed · boundary contact · update 3", browser.text("details"))
     assert browser.text("left-out") and browser.text("sources")
     assert browser.complaints == []
@@ -90,7 +90,7 @@ def test_the_value_at_the_cross_is_that_of_the_mesh(browser, surgery):
     _, _, model, update = surgery
     tumour_now = np.array([model.tumour.vertices.mean(axis=0)])
     was = brainshift.Field(brainshift.FieldMesh(model), update).undeformed(tumour_now)
-    told = re.search(r"in the MRI: R (\S+), A (\S+), S (\S+) · moved (\S+) ± (\S+) mm · (\d+) % known.* within (\S+) mm",
+    told = re.search(r"· in the MRI: R (\S+), A (\S+), S (\S+) · moved (\S+) ± (\S+) mm · (\d+) % known.* within (\S+) mm",
                      browser.text("cursor"))
     numbers = [float(n) for n in told.groups()]
     error = numbers[6] + 0.02  # of the grid, and of the figures' rounding

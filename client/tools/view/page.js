@@ -180,7 +180,8 @@ function judge() {
     if (state.currency === "aged") text = `AGED: ${why} · ${text}`;
     const shown = state.shown;
     if (shown?.motion_mm != null) {
-      text += ` · tumour moved ${shown.motion_mm.toFixed(1)}${shown.motion_sd == null ? "" : " ± " + shown.motion_sd.toFixed(1)} mm`;
+      const digits = shown.motion_sd != null && shown.motion_sd < 0.1 ? 2 : 1;
+      text += ` · tumour moved ${shown.motion_mm.toFixed(digits)}${shown.motion_sd == null ? "" : " ± " + shown.motion_sd.toFixed(digits)} mm`;
     }
   }
   text = recorded + text;
@@ -498,7 +499,7 @@ function drawStrip(canvas, strip, label, marked) {
   context.stroke();
   context.fillStyle = css.getPropertyValue("--soft");
   context.font = "11px system-ui, sans-serif";
-  context.fillText(top.toPrecision(2), 2, 11);
+  context.fillText(top.toFixed(strip.digits), 2, 11);
   if (n > 0) {
     context.fillText(`update ${points[0].update}`, 2, height - 2);
     const last = `${points[n - 1].update}`;
