@@ -18,8 +18,8 @@ from conftest import PROGRAMS, Daemon
 import brainshift
 
 pytestmark = pytest.mark.skipif(chromium.PROGRAM is None, reason="needs the program chromium")
-GREY = "document.body.className === 'grey'"
-LIVE = "document.body.className === ''"
+GREY = "document.body?.className === 'grey'"
+LIVE = "document.body?.className === ''"
 LEASE_S = 1.5  # within which a page must be grey
 
 
