@@ -21,7 +21,7 @@ foreach(name convert frame names published_update report)
   install(FILES ${CMAKE_SOURCE_DIR}/common/wire/${name}.hpp DESTINATION include/brainshift/common/wire COMPONENT client)
 endforeach()
 install(FILES ${CMAKE_SOURCE_DIR}/client/lib/client.hpp ${CMAKE_SOURCE_DIR}/client/lib/client_keys.hpp
-  ${CMAKE_SOURCE_DIR}/client/lib/field_status.hpp
+  ${CMAKE_SOURCE_DIR}/client/lib/field.hpp ${CMAKE_SOURCE_DIR}/client/lib/field_status.hpp
   DESTINATION include/brainshift/client/lib COMPONENT client)
 # What is included as <brainshift/client.hpp>.
 install(FILES ${CMAKE_SOURCE_DIR}/client/lib/brainshift/client.hpp DESTINATION include/brainshift COMPONENT client)

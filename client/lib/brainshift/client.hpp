@@ -4,4 +4,5 @@
 
 #include "client/lib/client.hpp"
 #include "client/lib/client_keys.hpp"
+#include "client/lib/field.hpp"
 #include "client/lib/field_status.hpp"

@@ -17,6 +17,7 @@ Research software for simulation, replay and laboratory use: no medical device.
 """
 from .client import Client, connect
 from .errors import Error, ProtocolError, Unavailable
+from .field import Field, FieldMesh, FieldValues, Undeformed
 from .keys import Keys, read_keys
 from .surgery import Surgery
 from .values import (AnswerTime, Ball, Choice, Contact, CorticalSurface, Currency, FieldStatus, LandmarkPairs, MeanStd, Model,
@@ -25,10 +26,10 @@ from .values import (AnswerTime, Ball, Choice, Contact, CorticalSurface, Currenc
                      TumourBoundary, Update)
 
 __all__ = [
-    "AnswerTime", "Ball", "Choice", "Client", "Contact", "CorticalSurface", "Currency", "Error", "FieldStatus", "Keys",
-    "LandmarkPairs", "MeanStd", "Model", "NearTumour", "Observation", "Omission", "PatientPose", "Phase",
+    "AnswerTime", "Ball", "Choice", "Client", "Contact", "CorticalSurface", "Currency", "Error", "Field", "FieldMesh",
+    "FieldStatus", "FieldValues", "Keys", "LandmarkPairs", "MeanStd", "Model", "NearTumour", "Observation", "Omission", "PatientPose", "Phase",
     "PriorStrength", "ProtocolError", "Quality", "QualityFlag", "Receipt", "Session", "SessionKey", "SessionState",
-    "SourceSummary", "Status", "Surface", "Surgery", "Timings", "TumourBoundary", "Unavailable", "Update", "connect",
-    "read_keys",
+    "SourceSummary", "Status", "Surface", "Surgery", "Timings", "TumourBoundary", "Unavailable", "Undeformed", "Update",
+    "connect", "read_keys",
 ]
 __version__ = "0.1.0"

@@ -216,8 +216,8 @@ def model(payload: bytes) -> v.Model:
 _STATUSES = ("not_run", "iterating", "converged", "iteration_limit", "deadline")
 _METHODS = ("condensed", "paper", "paper-woodbury", "pcg")
 _BOUNDARIES = ("contact", "fixed")
-_PRIOR_PARTS = ("along_gravity", "across_gravity", "gravity_sides", "gravity_ends", "tumour_volume", "brain_volume",
-                "resection", "opening", "fine", "medium", "coarse", "far")
+_PRIOR_PARTS = {"along_gravity", "across_gravity", "gravity_sides", "gravity_ends", "tumour_volume", "brain_volume",
+                "resection", "opening", "fine", "medium", "coarse", "far"}
 _MOST_HYPOTHESES = 4096
 _UNUSABLE_FROM = 17  # flags
 
@@ -260,8 +260,9 @@ def _quality(m: Any) -> tuple[v.Quality, tuple[v.QualityFlag, ...]]:
 
 def _prior(m: Any) -> tuple[v.PriorStrength, ...]:
     parts = [strength.part for strength in m.prior_strengths]
-    checked.require(len(set(parts)) == len(parts) and set(parts) <= set(_PRIOR_PARTS), "prior_strengths",
-                    "must be parts of the prior, each once")  # of an older prior fewer
+    # An older prior has fewer parts.
+    checked.require(_PRIOR_PARTS.issuperset(parts), "prior_strengths.part", f"must be one of {sorted(_PRIOR_PARTS)}")
+    checked.require(len(set(parts)) == len(parts), "prior_strengths.part", "occurs more than once")
     checked.require(len(m.hypotheses) <= _MOST_HYPOTHESES, "hypotheses", f"must be at most {_MOST_HYPOTHESES}")
     checked.require(bool(parts) or not m.hypotheses, "hypotheses", "are present without prior_strengths")
     for hypothesis in m.hypotheses:

@@ -34,6 +34,7 @@ void add_stereo(CLI::App& app, Status& status);
 void add_journal(CLI::App& app, Status& status);
 void add_export(CLI::App& app, Status& status);
 void add_watch(CLI::App& app, Status& status);
+void add_view(CLI::App& app, Status& status);
 void add_status(CLI::App& app, Status& status);
 void add_top(CLI::App& app, Status& status);
 void add_keys(CLI::App& app, Status& status);

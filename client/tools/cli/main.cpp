@@ -39,8 +39,8 @@ int main(int argc, char** argv) {
   for (const auto add :
        {client::add_preview, client::add_simulate, client::add_replay, client::add_report,
         client::add_solve, client::add_import, client::add_register, client::add_stereo,
-        client::add_journal, client::add_export, client::add_watch, client::add_bridge,
-        client::add_status, client::add_top, client::add_keys}) {
+        client::add_journal, client::add_export, client::add_watch, client::add_view,
+        client::add_bridge, client::add_status, client::add_top, client::add_keys}) {
     add(app, status);
   }
 
@@ -51,7 +51,7 @@ int main(int argc, char** argv) {
     client::print_error("unknown command \"" + std::string(argv[1]) +
                         "\": must be preview, simulate, replay, report, solve, import, register, "
                         "stereo, journal, export, "
-                        "watch, bridge, status, top or keys (see brainshift --help)");
+                        "watch, view, bridge, status, top or keys (see brainshift --help)");
     return kExitBadInput;
   }
   try {
