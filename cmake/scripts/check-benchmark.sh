@@ -2,8 +2,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 # check-benchmark.sh: fails when BENCHMARK.md is of a commit that is no ancestor of this one, or since
 # which the inversion has changed by more than comments and blank lines. Exit status 77 without the
-# history that tells, and where the page tells its readers that it is outdated and names a commit up to which the estimates
-# were the same: a later change of the inversion fails again.
+# history that tells, and where the page tells its readers that it is outdated and by what, and names a commit up to which it was
+# not measured anew: a later change of the inversion fails again.
 set -euo pipefail
 cd "$(dirname "$0")/../.."
 
@@ -26,12 +26,12 @@ changed_since() {
   git diff --ignore-blank-lines -I'^[[:space:]]*//' "$1" -- "${inversion[@]}" | sed -n 's/^diff --git a\/\([^ ]*\) .*/\1/p'
 }
 changed=$(changed_since "$commit")
-same=$(sed -n 's/^\*\*Outdated\*\*.* same estimates up to commit \([0-9a-f]*\)\..*/\1/p' BENCHMARK.md)
+same=$(sed -n 's/^\*\*Outdated\*\*.* not measured anew up to commit \([0-9a-f]*\)\..*/\1/p' BENCHMARK.md)
 if [ -n "$changed" ] && [ -n "$same" ]; then
   git merge-base --is-ancestor "$same" HEAD || { echo "BENCHMARK.md names $same, which is no ancestor of HEAD" >&2; exit 1; }
   changed=$(changed_since "$same")
   if [ -z "$changed" ]; then
-    echo "BENCHMARK.md is of $commit and says that it is outdated; same estimates up to $same (make bench)"
+    echo "BENCHMARK.md is of $commit and says that it is outdated; not measured anew up to $same (make bench)"
     exit 77
   fi
   commit=$same
