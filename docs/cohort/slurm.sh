@@ -32,6 +32,11 @@ for ((try = 1; try <= TRIES; ++try)); do
   status=0
   $APP "$1" "$2" participant --participant-label "$subject" --n-cpus "${SLURM_CPUS_PER_TASK:-1}" --mem-mb "$MEM_MB" "${@:3}" || status=$?
   [ $status -le 0 ] || [ $status -eq 2 ] || { echo "slurm.sh: $subject: try $try of $TRIES ended with $status" >&2; continue; }
-  exit 0 # 2: the subject cannot run; group_leftout.tsv says why
+  # 2: the subject cannot run; group_leftout.tsv says why. Whoever ends last makes the tables: the second job starts before
+  # a task that was requeued has ended, and makes them only where a task failed for good.
+  ended=$2/.work/ended-$SLURM_ARRAY_JOB_ID
+  mkdir -p "$ended" && touch "$ended/$subject"
+  if [ "$(find "$ended" -type f | wc -l)" -eq "$(wc -l <"$BRAINSHIFT_COHORT")" ]; then $APP "$1" "$2" group || [ $? -eq 2 ] || exit 1; fi
+  exit 0
 done
 exit 1

@@ -142,10 +142,11 @@ def test_an_image_that_cannot_be_read_is_named_with_the_reason(tmp_path):
     (tmp_path / "cut.nii").write_bytes(raw[:-1])
     (tmp_path / "text.nii.gz").write_text("no image")
     (tmp_path / "annex.nii.gz").symlink_to("../.git/annex/objects/x")
+    bids_tree.put(tmp_path / "flat.nii", np.ones((4, 4, 4), "uint8"), np.zeros((3, 4)))
     (tmp_path / "nowhere.nii").write_bytes(raw[:252] + bytes(4) + raw[256:])
     for name, part in (("empty.nii.gz", "is empty (0 bytes)"), ("cut.nii", "ends after 415 of 416 bytes"),
                        ("text.nii.gz", "is no NIfTI-1 file"), ("annex.nii.gz", "link to content that is not here"),
-                       ("nowhere.nii", "neither sform nor qform")):
+                       ("nowhere.nii", "neither sform nor qform"), ("flat.nii", "affine that has no inverse")):
         said = refusal(nifti.read, tmp_path / name)
         assert name in said and part in said
 
@@ -392,6 +393,7 @@ def test_another_dataset_is_no_output_folder(bids, programs, tmp_path):
     before = (other / "dataset_description.json").read_bytes()
     assert "is not brainshift's" in app(bids, other, "participant", "--programs", programs, expect=2).stderr
     assert (other / "dataset_description.json").read_bytes() == before
+    assert [file.name for file in other.iterdir()] == ["dataset_description.json"]
 
 
 # Compare
@@ -418,6 +420,13 @@ def test_a_version_that_is_worse_for_everybody_is_called_so(bids, programs, tmp_
     assert rows["tumour_error_mm"]["worse"] == "6" and rows["tumour_recovered_pct"]["verdict"] == "alike"
     assert "6 surgeries of 6 subjects" in done.stdout
     assert app("compare", a, a).returncode == 0
+
+
+def test_a_folder_of_both_boundaries_is_compared_in_the_one_that_both_have(bids, programs, tmp_path):
+    bids_tree.subject(bids, "01")
+    app(bids, tmp_path / "a", "participant", "--programs", programs)
+    app(bids, tmp_path / "b", "participant", "--programs", programs, "--boundary", "both")
+    assert "1 surgeries of 1 subjects; only before: 0, only after: 1" in app("compare", tmp_path / "a", tmp_path / "b").stdout
 
 
 def test_few_subjects_decide_nothing_and_nothing_shared_is_refused(bids, programs, tmp_path):

@@ -38,16 +38,19 @@ TABLE: dict[str, dict[str, object]] = {
                                "else undecided; few: below 6 subjects no difference can reach that p"}}
 
 
-def keyed(folder: Path) -> tuple[dict[tuple[object, ...], Row], str]:
-    """Runs by what must agree; boundary and method count among several of a surgery only."""
+def load(folder: Path) -> tuple[list[dict[str, object]], str]:
     found = group.results(folder)
-    rows = group.rows_of(found, measures.MEASURES)
-    by: dict[tuple[object, ...], Row] = {}
-    several = len({(r["method"], r["boundary"]) for r in rows}) > 1
-    for row in rows:
-        key = (row["participant_id"], row["session_id"], row["surgery"], row["seed"])
-        by[(*key, row["method"], row["boundary"]) if several else (*key, None, None)] = row
-    return by, str(found[0]["Programs"])
+    return group.rows_of(found, measures.MEASURES), str(found[0]["Programs"])
+
+
+def several(rows: list[dict[str, object]]) -> bool:
+    return len({(row["method"], row["boundary"]) for row in rows}) > 1
+
+
+def keyed(rows: list[dict[str, object]], how: bool) -> dict[tuple[object, ...], Row]:
+    """Runs by what must agree: method and boundary too, where one of the folders has several of them."""
+    keys = ("participant_id", "session_id", "surgery", "seed") + (("method", "boundary") if how else ())
+    return {tuple(row[key] for key in keys): row for row in rows}
 
 
 def run(before: Path, after: Path, out: Path | None) -> tuple[str, bool]:
@@ -55,7 +58,9 @@ def run(before: Path, after: Path, out: Path | None) -> tuple[str, bool]:
     for folder in (before, after):
         if not folder.is_dir():
             raise Refused(f"{folder} is no folder")
-    (first, made_first), (second, made_second) = keyed(before), keyed(after)
+    (rows_before, made_first), (rows_after, made_second) = load(before), load(after)
+    how = several(rows_before) or several(rows_after)
+    first, second = keyed(rows_before, how), keyed(rows_after, how)
     both = sorted(set(first) & set(second), key=str)
     if not both:
         raise Refused(f"{before} and {after} share no surgery (same subject, session, scenario, seed)")

@@ -152,9 +152,9 @@ def named_labels(segmentation: Path) -> dict[int, str]:
     above = [folder / n for folder in list(segmentation.parents)[:4] for n in [*shared, "dseg.tsv"]]
     for table in [own, *above]:
         if table.is_file():
-            with open(table, newline="", encoding="utf-8") as stream:
-                rows = list(csv.DictReader(stream, delimiter="\t"))
             try:
+                with open(table, newline="", encoding="utf-8") as stream:
+                    rows = list(csv.DictReader(stream, delimiter="\t"))
                 return {int(row["index"]): row["name"] or "" for row in rows}
             except (KeyError, TypeError, ValueError):
                 raise Refused(f"{table.name}: columns index (whole numbers) and name are needed") from None

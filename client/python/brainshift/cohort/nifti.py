@@ -88,9 +88,12 @@ def read(path: Path) -> Image:
     if slope not in (0.0, 1.0) or (slope == 1.0 and intercept):
         values = values * slope + intercept
     try:
-        return Image(values, affine_of(raw, order), raw[:348], order)
+        affine = affine_of(raw, order)
     except Refused as refused:
         raise Refused(f"{path.name} {refused}") from None
+    if not np.isfinite(affine).all() or abs(np.linalg.det(affine)) < 1e-9:
+        raise Refused(f"{path.name} has an affine that has no inverse: {affine[:3].round(3).tolist()}")
+    return Image(values, affine, raw[:348], order)
 
 
 def write_mask(path: Path, mask: npt.NDArray[np.bool_], like: Image) -> None:

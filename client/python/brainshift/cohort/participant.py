@@ -72,33 +72,28 @@ class Surgery:
 
 def describe(request: Request) -> None:
     """dataset_description.json and .bidsignore of the derivative, unless they are there."""
-    with locked(request.output / ".work" / "dataset.lock"):
-        for name in ("dataset_description", ".bidsignore"):
-            drop_temporaries(request.output, name)
-        _describe(request)
-
-
-def _describe(request: Request) -> None:
-    file = request.output / "dataset_description.json"
+    file, ignored = request.output / "dataset_description.json", request.output / ".bidsignore"
     if file.exists():
         found = read_json(file)
         makers = found.get("GeneratedBy") if isinstance(found, dict) else None
         if not isinstance(makers, list) or not any(isinstance(m, dict) and m.get("Name") == "brainshift" for m in makers):
             raise Refused(f"{file} is not brainshift's: choose a folder of its own")
-    else:
-        if (request.output / "participants.tsv").exists():
-            raise Refused(f"{request.output} holds another dataset: choose a folder of its own")
-        described = {"Name": "brainshift: simulated and recorded surgeries, with the estimate of the brain's shift",
-                     "BIDSVersion": BIDS_VERSION, "DatasetType": "derivative",
-                     "GeneratedBy": [{"Name": "brainshift", "Version": request.programs.identity.split()[-2],
-                                      "Description": "brainshift-bids; research software, no medical device"}],
-                     "SourceDatasets": [{"URL": request.bids.resolve().as_uri()}]}
-        write_json(file, described)
-    ignored = request.output / ".bidsignore"
-    if not ignored.exists():
-        write(ignored, "".join(line + "\n" for line in (
-            "# No names in BIDS for a surgery's result or a mechanical case.", ".work/", "group_*", "compare_*",
-            "**/*_case.*", "**/*_result.json", "**/*_surgeries.*", "**/*_report.html", "**/*_leftout.json")))
+    elif (request.output / "participants.tsv").exists():
+        raise Refused(f"{request.output} holds another dataset: choose a folder of its own")
+    with locked(request.output / ".work" / "dataset.lock"):
+        for name in (file.name, ignored.name):
+            drop_temporaries(request.output, name)
+        if not ignored.exists():
+            write(ignored, "".join(line + "\n" for line in (
+                "# No names in BIDS for a surgery's result or a mechanical case.", ".work/", "group_*", "compare_*",
+                "**/*_case.*", "**/*_result.json", "**/*_surgeries.*", "**/*_report.html", "**/*_leftout.json")))
+        if not file.exists():
+            write_json(file, {
+                "Name": "brainshift: simulated and recorded surgeries, with the estimate of the brain's shift",
+                "BIDSVersion": BIDS_VERSION, "DatasetType": "derivative",
+                "GeneratedBy": [{"Name": "brainshift", "Version": request.programs.identity.split()[-2],
+                                 "Description": "brainshift-bids; research software, no medical device"}],
+                "SourceDatasets": [{"URL": request.bids.resolve().as_uri()}]})
 
 
 def fingerprint(parts: object) -> str:
