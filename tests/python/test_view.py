@@ -168,10 +168,13 @@ def test_another_session_takes_the_field_away(browser, surgery):
     assert browser.js(GREY)
 
 
-def test_a_page_of_a_dead_daemon_stays_grey(browser, surgery):
+def test_a_page_of_a_dead_daemon_goes_grey(browser, surgery, head):
+    with brainshift.Surgery(head / "joint.surgery") as recorded:
+        surgery[1].submit_observation(next(recorded.observations()))
+    browser.wait(LIVE)
     surgery[0].process.kill()
-    browser.wait("document.getElementById('verdict').textContent.startsWith('NOT CURRENT')", 5 * LEASE_S)
-    assert browser.js(GREY)
+    assert browser.wait(GREY) < LEASE_S
+    assert browser.text("verdict").startswith("NOT CURRENT: ")
 
 
 def test_bad_options_are_one_line(head):
