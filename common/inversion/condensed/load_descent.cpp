@@ -156,6 +156,11 @@ Status LoadDescent::linearise(SampledOperators& sampled) {
   return {};
 }
 
+double LoadDescent::reach(const VecX& penetration, int most) {
+  const StageClock clock(profile_, UpdateStage::kReach);
+  return reach_.along(step_, penetration, most);
+}
+
 int LoadDescent::most_changes() const {
   return std::max(kFewSlaves, reduction_.size() / kPartOfSlaves);
 }
@@ -236,7 +241,7 @@ Result<EstimateStatus> LoadDescent::descend_smoothly(SampledOperators& sampled,
       decrement_ = std::sqrt(fall);
       if (decrement_ <= tolerance) return EstimateStatus::kConverged;
       posterior_.unwhiten(direction_, step_);
-      length = longest = reach_.along(step_, penetration_, most);
+      length = longest = reach(penetration_, most);
     }
     change_ = length * direction_;
     if (auto ok = attempt(sampled, strengths, change_); !ok) return tl::unexpected(ok.error());
@@ -330,7 +335,7 @@ Status LoadDescent::average(SampledOperators& sampled, PriorStrengths& strengths
   if (auto status = return_contact(); !status) return status;
   const double most_probable = misfit(sampled, z_);
   step_ = shift.tail(window_.count);
-  double length = reach_.along(step_, contact_.penetration(), most_changes() / 2);
+  double length = reach(contact_.penetration(), most_changes() / 2);
   for (;; length *= 0.5) {
     if (length < kShortestStep) length = 0.0;
     mean_z_ = z_ + length * step_;

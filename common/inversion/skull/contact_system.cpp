@@ -59,12 +59,12 @@ bool ReleasedSlaves::make_inverse() {
     blas::multiply(1.0, e, response_.middleCols(begin, end - begin), 0.0,
                    loads_.middleCols(begin, end - begin));
   });
-  made_ = true;
   return true;
 }
 
 bool ReleasedSlaves::take(const contact::ActiveSet& pressing) {
-  if (!made_ && !make_inverse()) return false;
+  prepare();
+  if (!made_) return false;
   for (std::size_t i = 0; i < pressing.size(); ++i) released_set_[i] = pressing[i] ? 0 : 1;
   list_active(pressing, pressing_);
   return factor_.take(released_set_);
@@ -176,6 +176,7 @@ ContactSystem::ContactSystem(const CondensedOperators& operators, ModeWindow win
       team_(team),
       pressing_(operators.compliance.data(), operators.num_slaves(), 1.0 / beta, team),
       released_(operators, window, beta, team),
+      modes_of_slave_(operators.slave_modes.middleCols(window.first, window.count).transpose()),
       work_(PrincipalFactor::most_work_rows(operators.num_slaves()), window.count + 1) {
   set_.reserve(static_cast<std::size_t>(operators.num_slaves()));
   active_.reserve(static_cast<std::size_t>(operators.num_slaves()));
@@ -233,9 +234,7 @@ void ContactSystem::add_adjoint(const Eigen::Ref<const VecX>& felt, VecX& out) {
   adjoint_ = felt;
   pressing_.solve(adjoint_, work_.topLeftCorner(pressing_.work_rows(), 1));
   for (int j = 0; j < size(); ++j) {
-    out += adjoint_[j] * operators_.slave_modes.row(active_[static_cast<std::size_t>(j)])
-                             .segment(window_.first, window_.count)
-                             .transpose();
+    out += adjoint_[j] * modes_of_slave_.col(active_[static_cast<std::size_t>(j)]);
   }
 }
 

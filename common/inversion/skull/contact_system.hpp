@@ -9,7 +9,7 @@
 // swelling that presses 1,900 of 2,394 slaves on the skull costs a factor of 500 rows.
 //
 // Memory for all slaves is reserved by the constructor; nothing is allocated afterwards, but for
-// what ReleasedSlaves makes once.
+// what ReleasedSlaves makes once where prepare() was not called.
 #pragma once
 
 #include <memory>
@@ -34,15 +34,16 @@ namespace brainshift::inversion {
 //   D f + P = b with f_Q = 0, P_A = 0   =>   E_QQ P_Q = (E b)_Q,   f_A = (E b)_A - E_AQ P_Q
 //
 // with E = D^-1: a factor of q x q instead of k x k (ContactSystem). E and E [L p] depend on
-// the patient alone. They are made by the first take(), which costs s^3 flops and 8 s^2 bytes, in
-// scenes that need them: 0.3 s and 46 MiB for 2,394 slaves. Besides, nothing is allocated after
-// construction.
+// the patient alone. They are made by prepare(), else by the first take(), which costs s^3 flops
+// and 8 s^2 bytes: 0.3 s and 46 MiB for 2,394 slaves. Nothing else is allocated after construction.
 class ReleasedSlaves {
  public:
   // Keeps references to operators and team. beta: penalty, N/mm.
   ReleasedSlaves(const CondensedOperators& operators, ModeWindow window, double beta,
                  ThreadTeam& team);
 
+  // Makes E, so that no update pays for it. Where D cannot be factorised, take() says so.
+  void prepare() { made_ = made_ || make_inverse(); }
   // What follows is for this set of pressing slaves. false when D, or E of those that are
   // released, cannot be factorised.
   [[nodiscard]] bool take(const contact::ActiveSet& pressing);
@@ -89,6 +90,8 @@ class ContactSystem {
   ContactSystem(const CondensedOperators& operators, ModeWindow window, double beta,
                 ThreadTeam& team);
 
+  // ReleasedSlaves::prepare().
+  void prepare() { released_.prepare(); }
   // What follows is for this set. set: one flag per slave, or empty for none. kSingularMatrix when
   // its compliance cannot be factorised; no set is held then.
   Status take(const contact::ActiveSet& set);
@@ -118,7 +121,8 @@ class ContactSystem {
   contact::ActiveSet set_;
   std::vector<int> active_;
   bool by_released_ = false;
-  Eigen::MatrixXd work_;  // of PrincipalFactor::solve
+  Eigen::MatrixXd modes_of_slave_;  // L^T, r x s
+  Eigen::MatrixXd work_;            // of PrincipalFactor::solve
   linalg::GrowingVector adjoint_;
 };
 
