@@ -36,7 +36,7 @@ LoadDescent::LoadDescent(const CondensedOperators& operators, ModeWindow window,
       team_(team),
       profile_(profile),
       system_(operators, window, beta, team),
-      reduction_(operators, window, system_),
+      reduction_(operators, window, system_, team),
       contact_(operators, window, beta, contact, system_, team),
       reach_(operators, window, beta, contact, reduction_, team),
       posterior_(window),
@@ -149,10 +149,10 @@ void LoadDescent::accept_trial() {
   contact_at_z_ = contact_kept_ = true;
 }
 
-Status LoadDescent::linearise(SampledOperators& sampled) {
+Status LoadDescent::linearise(SampledOperators& sampled, bool same_data) {
   const StageClock clock(profile_, UpdateStage::kLinearise);
   if (auto status = reduction_.activate(contact_.set()); !status) return status;
-  posterior_.linearise(sampled, reduction_, team_);
+  posterior_.linearise(sampled, reduction_, same_data, team_);
   return {};
 }
 
@@ -184,7 +184,7 @@ Status LoadDescent::jump(SampledOperators& sampled, const PriorStrengths& streng
 
 Status LoadDescent::take(SampledOperators& sampled) {
   if (auto status = return_contact(); !status) return status;
-  return linearise(sampled);
+  return linearise(sampled, false);
 }
 
 Status LoadDescent::begin(SampledOperators& sampled, const PriorStrengths& strengths) {

@@ -109,8 +109,8 @@ class LoadDescent {
   const ModePosterior& posterior() const { return posterior_; }
 
  private:
-  // The linear model of the set that contact has at z_.
-  Status linearise(SampledOperators& sampled);
+  // The linear model of the set that contact has at z_. same_data: as those of the last one.
+  Status linearise(SampledOperators& sampled, bool same_data = true);
   Result<EstimateStatus> descend_smoothly(SampledOperators& sampled,
                                           const PriorStrengths& strengths, double tolerance,
                                           const DescentLimits& limits);

@@ -96,16 +96,52 @@ void ReleasedSlaves::solve(const VecX& z, Eigen::Ref<VecX> forces, VecX& penetra
   }
 }
 
-void ReleasedSlaves::respond(Eigen::Ref<Eigen::MatrixXd> out) {
-  const auto q = static_cast<Eigen::Index>(factor_.size());
-  const auto k = static_cast<Eigen::Index>(pressing_.size());
+Eigen::Map<Eigen::MatrixXd> ReleasedSlaves::gather_between() {
   const std::vector<int>& released = factor_.active();
-  Eigen::Map<Eigen::MatrixXd> between(gathered_.get(), q, k);
-  team_.split(k, [&](long begin, long end) {
+  Eigen::Map<Eigen::MatrixXd> between(gathered_.get(), factor_.size(),
+                                      static_cast<Eigen::Index>(pressing_.size()));
+  team_.split(between.cols(), [&](long begin, long end) {
     for (Eigen::Index j = begin; j < end; ++j) {
       gather(column(pressing_[static_cast<std::size_t>(j)]), released, between.col(j).data());
     }
   });
+  return between;
+}
+
+// D_AA^-1 D_AQ = -E_AQ E_QQ^-1 and D_AA^-1 = E_AA - E_AQ E_QQ^-1 E_QA.
+void ReleasedSlaves::respond_to_changes(const std::vector<int>& left,
+                                        const std::vector<int>& joined,
+                                        Eigen::Ref<Eigen::MatrixXd> out) {
+  const auto q = static_cast<Eigen::Index>(factor_.size());
+  const auto away = static_cast<Eigen::Index>(left.size());
+  const std::vector<int>& released = factor_.active();
+  const auto between = gather_between();
+  auto depth = response_.topLeftCorner(q, out.cols());
+  team_.split(out.cols(), [&](long begin, long end) {
+    for (Eigen::Index c = begin; c < end; ++c) {
+      if (c < away) {
+        const int slave = left[static_cast<std::size_t>(c)];
+        depth.col(c).setZero();
+        depth(std::lower_bound(released.begin(), released.end(), slave) - released.begin(), c) =
+            1.0;
+        out.col(c).setZero();
+      } else {
+        const double* own = column(joined[static_cast<std::size_t>(c - away)]);
+        gather(own, released, depth.col(c).data());
+        gather(own, pressing_, out.col(c).data());
+      }
+    }
+    if (q == 0) return;
+    auto own = depth.middleCols(begin, end - begin);
+    factor_.solve(own, work_.block(0, begin, factor_.work_rows(), end - begin));
+    blas::multiply_transposed(-1.0, between, own, 1.0, out.middleCols(begin, end - begin));
+  });
+}
+
+void ReleasedSlaves::respond(Eigen::Ref<Eigen::MatrixXd> out) {
+  const auto q = static_cast<Eigen::Index>(factor_.size());
+  const std::vector<int>& released = factor_.active();
+  const auto between = gather_between();
   auto depth = response_.topRows(q);
   team_.split(out.cols(), [&](long begin, long end) {
     for (Eigen::Index c = begin; c < end; ++c) {
@@ -223,6 +259,26 @@ void ContactSystem::respond(Eigen::Ref<Eigen::MatrixXd> out) {
       const double* load = j < r ? operators_.slave_modes.col(window_.first + j).data()
                                  : operators_.initial_penetration_mm.data();
       gather(load, active_, out.col(j).data());
+    }
+    pressing_.solve(out.middleCols(begin, end - begin),
+                    work_.block(0, begin, pressing_.work_rows(), end - begin));
+  });
+}
+
+void ContactSystem::respond_to_changes(const std::vector<int>& left, const std::vector<int>& joined,
+                                       Eigen::Ref<Eigen::MatrixXd> out) {
+  if (by_released_) return released_.respond_to_changes(left, joined, out);
+  const auto away = static_cast<Eigen::Index>(left.size());
+  team_.split(out.cols(), [&](long begin, long end) {
+    for (Eigen::Index c = begin; c < end; ++c) {
+      if (c < away) {
+        gather(operators_.compliance.col(left[static_cast<std::size_t>(c)]).data(), active_,
+               out.col(c).data());
+      } else {
+        const int slave = joined[static_cast<std::size_t>(c - away)];
+        out.col(c).setZero();
+        out(std::lower_bound(active_.begin(), active_.end(), slave) - active_.begin(), c) = 1.0;
+      }
     }
     pressing_.solve(out.middleCols(begin, end - begin),
                     work_.block(0, begin, pressing_.work_rows(), end - begin));

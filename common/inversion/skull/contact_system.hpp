@@ -53,6 +53,9 @@ class ReleasedSlaves {
   void solve(const VecX& z, Eigen::Ref<VecX> forces, VecX& penetration);
   // D_AA^-1 [L_A p_A], k x (r + 1).
   void respond(Eigen::Ref<Eigen::MatrixXd> out);
+  // ContactSystem::respond_to_changes.
+  void respond_to_changes(const std::vector<int>& left, const std::vector<int>& joined,
+                          Eigen::Ref<Eigen::MatrixXd> out);
   // out += L_A^T D_AA^-1 felt. felt: k; out: r.
   void add_adjoint(const Eigen::Ref<const VecX>& felt, VecX& out);
   // B = D_AA^-1 B for any right-hand sides, k rows. Allocates.
@@ -63,6 +66,8 @@ class ReleasedSlaves {
   Eigen::Map<Eigen::MatrixXd> inverse() const { return {inverse_.get(), slaves(), slaves()}; }
   const double* column(int slave) const { return inverse_.get() + slaves() * slave; }
   bool make_inverse();
+  // E_QA, q x k.
+  Eigen::Map<Eigen::MatrixXd> gather_between();
 
   const CondensedOperators& operators_;
   ModeWindow window_;
@@ -106,6 +111,11 @@ class ContactSystem {
              VecX& penetration);
   // [T f0] = (Phi_AA + I / beta)^-1 [L_A p_A], k x (r + 1).
   void respond(Eigen::Ref<Eigen::MatrixXd> out);
+  // Y = D_AA^-1 [D_AQ E_a], D = Phi + I / beta, for slaves Q that are not in the set and slaves a
+  // that are (E_a: their unit columns): what the forces follow when Q left the set and a joined it.
+  // At most r + 1 columns.
+  void respond_to_changes(const std::vector<int>& left, const std::vector<int>& joined,
+                          Eigen::Ref<Eigen::MatrixXd> out);
   // out += T^T felt. felt: one per active slave; out: r.
   void add_adjoint(const Eigen::Ref<const VecX>& felt, VecX& out);
   // B = (Phi_AA + I / beta)^-1 B for any right-hand sides, k rows. Allocates.
