@@ -40,6 +40,12 @@ int columns(const Matrix& matrix) {
   return static_cast<int>(matrix.cols());
 }
 
+// dtrsm packs the factor first, which costs more than one column's solution does.
+void solve_one(CBLAS_TRANSPOSE transposed, const In<double>& l, Out<double> b) {
+  cblas_dtrsv(CblasColMajor, CblasLower, transposed, CblasNonUnit, rows(b), l.data(), leading(l),
+              b.data(), 1);
+}
+
 }  // namespace
 
 void multiply(double alpha, const In<double>& a, const In<double>& b, double beta, Out<double> c) {
@@ -133,12 +139,14 @@ void tridiagonalise(Out<double> a, Eigen::Ref<Eigen::VectorXd> b,
 
 void solve_lower(const In<double>& l, Out<double> b) {
   assert(l.rows() == b.rows());
+  if (b.cols() == 1) return solve_one(CblasNoTrans, l, b);
   cblas_dtrsm(CblasColMajor, CblasLeft, CblasLower, CblasNoTrans, CblasNonUnit, rows(b), columns(b),
               1.0, l.data(), leading(l), b.data(), leading(b));
 }
 
 void solve_lower_transposed(const In<double>& l, Out<double> b) {
   assert(l.rows() == b.rows());
+  if (b.cols() == 1) return solve_one(CblasTrans, l, b);
   cblas_dtrsm(CblasColMajor, CblasLeft, CblasLower, CblasTrans, CblasNonUnit, rows(b), columns(b),
               1.0, l.data(), leading(l), b.data(), leading(b));
 }

@@ -49,6 +49,7 @@ struct CondensedInverter::Impl {
                     static_cast<std::size_t>(condensed.max_contact_iterations + 1));
     loads.reserve(kReservedData);
     contradictions.reserve(kReservedData);
+    if (options.contact) loads.descent().prepare();
   }
 
   static ModeWindow mode_window(const CondensedOperators& operators,
@@ -146,6 +147,7 @@ Status CondensedInverter::Impl::finish(Estimate& estimate) {
     const StageClock clock(profile, UpdateStage::kField);
     rebuild.displacement(team, descent.z(), contact, estimate.displacement);
   }
+  const StageClock checking(profile, UpdateStage::kCheck);
   if (auto status = check_equilibrium(*operators, rebuilt_slaves, contact.penetration(),
                                       estimate.displacement);
       !status) {

@@ -36,7 +36,7 @@ LoadDescent::LoadDescent(const CondensedOperators& operators, ModeWindow window,
       team_(team),
       profile_(profile),
       system_(operators, window, beta, team),
-      reduction_(operators, window, system_),
+      reduction_(operators, window, system_, team),
       contact_(operators, window, beta, contact, system_, team),
       reach_(operators, window, beta, contact, reduction_, team),
       posterior_(window),
@@ -149,11 +149,16 @@ void LoadDescent::accept_trial() {
   contact_at_z_ = contact_kept_ = true;
 }
 
-Status LoadDescent::linearise(SampledOperators& sampled) {
+Status LoadDescent::linearise(SampledOperators& sampled, bool same_data) {
   const StageClock clock(profile_, UpdateStage::kLinearise);
   if (auto status = reduction_.activate(contact_.set()); !status) return status;
-  posterior_.linearise(sampled, reduction_, team_);
+  posterior_.linearise(sampled, reduction_, same_data, team_);
   return {};
+}
+
+double LoadDescent::reach(const VecX& penetration, int most) {
+  const StageClock clock(profile_, UpdateStage::kReach);
+  return reach_.along(step_, penetration, most);
 }
 
 int LoadDescent::most_changes() const {
@@ -179,7 +184,7 @@ Status LoadDescent::jump(SampledOperators& sampled, const PriorStrengths& streng
 
 Status LoadDescent::take(SampledOperators& sampled) {
   if (auto status = return_contact(); !status) return status;
-  return linearise(sampled);
+  return linearise(sampled, false);
 }
 
 Status LoadDescent::begin(SampledOperators& sampled, const PriorStrengths& strengths) {
@@ -236,7 +241,7 @@ Result<EstimateStatus> LoadDescent::descend_smoothly(SampledOperators& sampled,
       decrement_ = std::sqrt(fall);
       if (decrement_ <= tolerance) return EstimateStatus::kConverged;
       posterior_.unwhiten(direction_, step_);
-      length = longest = reach_.along(step_, penetration_, most);
+      length = longest = reach(penetration_, most);
     }
     change_ = length * direction_;
     if (auto ok = attempt(sampled, strengths, change_); !ok) return tl::unexpected(ok.error());
@@ -330,7 +335,7 @@ Status LoadDescent::average(SampledOperators& sampled, PriorStrengths& strengths
   if (auto status = return_contact(); !status) return status;
   const double most_probable = misfit(sampled, z_);
   step_ = shift.tail(window_.count);
-  double length = reach_.along(step_, contact_.penetration(), most_changes() / 2);
+  double length = reach(contact_.penetration(), most_changes() / 2);
   for (;; length *= 0.5) {
     if (length < kShortestStep) length = 0.0;
     mean_z_ = z_ + length * step_;

@@ -72,6 +72,8 @@ class LoadDescent {
   LoadDescent(const CondensedOperators& operators, ModeWindow window, double beta, bool contact,
               ThreadTeam& team, UpdateProfile& profile);
   void reserve(int data) { posterior_.reserve(data); }
+  // Makes what only sets of most slaves need (ReleasedSlaves).
+  void prepare() { system_.prepare(); }
   // The next search begins without loads and contact.
   void forget();
 
@@ -107,8 +109,8 @@ class LoadDescent {
   const ModePosterior& posterior() const { return posterior_; }
 
  private:
-  // The linear model of the set that contact has at z_.
-  Status linearise(SampledOperators& sampled);
+  // The linear model of the set that contact has at z_. same_data: as those of the last one.
+  Status linearise(SampledOperators& sampled, bool same_data = true);
   Result<EstimateStatus> descend_smoothly(SampledOperators& sampled,
                                           const PriorStrengths& strengths, double tolerance,
                                           const DescentLimits& limits);
@@ -120,6 +122,8 @@ class LoadDescent {
   Status attempt(SampledOperators& sampled, const PriorStrengths& strengths, const VecX& whitened);
   bool far_from_model() const;
   int most_changes() const;
+  // ContactReach::along(step_).
+  double reach(const VecX& penetration, int most);
   // Contact at z, from the forces that the linear model predicts.
   Status solve_contact(const VecX& z);
   // The same at z_, unless contact_ is there already.

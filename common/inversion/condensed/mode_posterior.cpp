@@ -78,17 +78,38 @@ ModePosterior::ModePosterior(ModeWindow window) : window_(window) {
 void ModePosterior::reserve(int data) {
   if (3 * data <= jacobian_.rows()) return;
   linalg::replace(residual_, 3 * data);
+  linalg::replace(changed_, 3 * data, ContactReduction::kMaxChanges);
   linalg::replace(jacobian_, 3 * data, SparseData::kMaxCommonErrors + window_.count + 1);
 }
 
+// J -= (A G_A Y - [A G_Q 0]) S, contact_reduction.hpp.
+void ModePosterior::follow_changes(SampledOperators& sampled, const ContactReduction& reduction,
+                                   ThreadTeam& team) {
+  auto moved = changed_.topLeftCorner(rows_, reduction.changes());
+  const auto contact = sampled.contact(reduction.active());
+  const auto columns = reduction.change_columns();
+  team.split(moved.cols(), [&](long begin, long end) {
+    blas::multiply(1.0, contact, columns.middleCols(begin, end - begin), 0.0,
+                   moved.middleCols(begin, end - begin));
+  });
+  const auto left = sampled.contact(reduction.left());
+  moved.leftCols(left.cols()) -= left;
+  const auto sizes = reduction.change_sizes();
+  team.split(sizes.cols(), [&](long begin, long end) {
+    blas::multiply(-1.0, moved, sizes.middleCols(begin, end - begin), 1.0,
+                   jacobian_.block(0, common_ + begin, rows_, end - begin));
+  });
+}
+
 void ModePosterior::linearise(SampledOperators& sampled, const ContactReduction& reduction,
-                              ThreadTeam& team) {
+                              bool same_data, ThreadTeam& team) {
   common_ = sampled.common();
   rows_ = sampled.rows();
   const Eigen::Index r = window_.count, size = unknowns();
   auto j = jacobian_.topLeftCorner(rows_, size + 1);
-  j = sampled.free_body();
-  if (reduction.size() > 0) {
+  if (same_data && reduction.changes() > 0) {
+    follow_changes(sampled, reduction, team);
+  } else if (j = sampled.free_body(); reduction.size() > 0) {
     const auto contact = sampled.contact(reduction.active());
     const auto response = reduction.response();
     team.split(r + 1, [&](long begin, long end) {

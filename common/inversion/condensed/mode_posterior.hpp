@@ -60,8 +60,10 @@ class ModePosterior {
   explicit ModePosterior(ModeWindow window);
   void reserve(int data);
 
-  // The linear model of the reduction's set: J, G = J^T J and b = J^T d.
-  void linearise(SampledOperators& sampled, const ContactReduction& reduction, ThreadTeam& team);
+  // The linear model of the reduction's set: J, G = J^T J and b = J^T d. same_data: the last call
+  // was for the same data and for the set before, so that J follows the reduction's changes.
+  void linearise(SampledOperators& sampled, const ContactReduction& reduction, bool same_data,
+                 ThreadTeam& team);
   // Minimises the objective for the held strengths and takes the minimum for the answer.
   // kNotFinite when the normal equations are not positive definite.
   Status minimise(const PriorStrengths& strengths);
@@ -112,11 +114,13 @@ class ModePosterior {
   }
   void fill_scales(const PriorStrengths& strengths);
   void update_residual();
+  void follow_changes(SampledOperators& sampled, const ContactReduction& reduction,
+                      ThreadTeam& team);
 
   ModeWindow window_;
   int common_ = 0;
   Eigen::Index rows_ = 0;
-  Eigen::MatrixXd jacobian_;
+  Eigen::MatrixXd jacobian_, changed_;  // changed_: R^-1/2 A of what changes of the set move
   VecX residual_, gram_storage_, factor_storage_, right_, solution_, z_;
   VecX scales_;  // 1 for c, s for z
   mutable VecX full_;

@@ -17,17 +17,19 @@ enum class UpdateStage {
   kGradient,    // the objective and its gradient at given loads
   kLinearise,   // the linear model of a set of active slaves
   kMinimise,    // its minimum
+  kReach,       // how far a step may go before contact changes in many slaves
   kHypotheses,  // hypotheses about the prior's strengths, their mean and covariance
   kFollow,      // places and weights of data for the present estimate
-  kDeviation,   // standard deviation of every node
+  kDeviation,   // standard deviation of every node, and what is known of it
   kField,       // displacement of every node
+  kCheck,       // the field's equilibrium and deformation, agreement of the sources, omissions
 };
-inline constexpr std::size_t kUpdateStages = 10;
+inline constexpr std::size_t kUpdateStages = 12;
 
 constexpr const char* to_string(UpdateStage stage) {
   constexpr std::array<const char*, kUpdateStages> kNames = {
-      "locate",   "sample",     "contact", "gradient",  "linearise",
-      "minimise", "hypotheses", "follow",  "deviation", "field"};
+      "locate", "sample",     "contact", "gradient",  "linearise", "minimise",
+      "reach",  "hypotheses", "follow",  "deviation", "field",     "check"};
   return kNames[static_cast<std::size_t>(stage)];
 }
 

@@ -2,28 +2,97 @@
 #include "common/inversion/skull/contact_reduction.hpp"
 
 #include <algorithm>
+#include <iterator>
 
 #include "common/linalg/blas.hpp"
 
 namespace brainshift::inversion {
 
 ContactReduction::ContactReduction(const CondensedOperators& operators, ModeWindow window,
-                                   ContactSystem& system)
+                                   ContactSystem& system, ThreadTeam& team)
     : operators_(operators),
       window_(window),
       system_(system),
-      response_(operators.num_slaves(), window.count + 1) {
-  active_.reserve(static_cast<std::size_t>(operators.num_slaves()));
+      team_(team),
+      response_(operators.num_slaves(), window.count + 1),
+      before_response_(operators.num_slaves(), window.count + 1),
+      columns_(new double[static_cast<std::size_t>(operators.num_slaves()) * kMaxChanges]),
+      sizes_(kMaxChanges, window.count + 1) {
+  for (std::vector<int>* each : {&active_, &before_, &left_, &joined_}) {
+    each->reserve(static_cast<std::size_t>(operators.num_slaves()));
+  }
   set_.reserve(static_cast<std::size_t>(operators.num_slaves()));
 }
 
+bool ContactReduction::list_changes() {
+  left_.clear();
+  joined_.clear();
+  std::set_difference(before_.begin(), before_.end(), active_.begin(), active_.end(),
+                      std::back_inserter(left_));
+  std::set_difference(active_.begin(), active_.end(), before_.begin(), before_.end(),
+                      std::back_inserter(joined_));
+  const int most = std::min({kMaxChanges, size() / kPart, window_.count + 1});
+  if (changes() > 0 && changes() <= most) return true;
+  left_.clear();
+  joined_.clear();
+  return false;
+}
+
+void ContactReduction::follow() {
+  const auto old = response_of(before_response_, static_cast<int>(before_.size()));
+  const auto away = static_cast<Eigen::Index>(left_.size());
+  const auto fresh = static_cast<Eigen::Index>(joined_.size());
+  Eigen::Map<Eigen::MatrixXd> between(columns_.get(), old.rows(), fresh);
+  for (Eigen::Index j = 0; j < fresh; ++j) {
+    gather(operators_.compliance.col(joined_[static_cast<std::size_t>(j)]).data(), before_,
+           between.col(j).data());
+  }
+  Eigen::Map<Eigen::MatrixXd> now(response_.data(), size(), window_.count + 1);
+  auto sizes = sizes_.topRows(changes());
+  team_.split(now.cols(), [&](long begin, long end) {
+    for (Eigen::Index c = begin; c < end; ++c) {
+      const double* load = c < window_.count ? operators_.slave_modes.col(window_.first + c).data()
+                                             : operators_.initial_penetration_mm.data();
+      gather(load, joined_, sizes.col(c).data() + away);
+      Eigen::Index to = 0, leaving = 0;
+      for (Eigen::Index from = 0; from < old.rows(); ++from) {
+        const int slave = before_[static_cast<std::size_t>(from)];
+        if (leaving < away && left_[static_cast<std::size_t>(leaving)] == slave) {
+          sizes(leaving++, c) = old(from, c);
+          continue;
+        }
+        while (active_[static_cast<std::size_t>(to)] != slave) now(to++, c) = 0.0;
+        now(to++, c) = old(from, c);
+      }
+      while (to < now.rows()) now(to++, c) = 0.0;
+    }
+    if (fresh > 0) {
+      linalg::blas::multiply_transposed(-1.0, between, old.middleCols(begin, end - begin), 1.0,
+                                        sizes.block(away, begin, fresh, end - begin));
+    }
+  });
+  Eigen::Map<Eigen::MatrixXd> columns(columns_.get(), size(), changes());
+  system_.respond_to_changes(left_, joined_, columns);
+  team_.split(now.cols(), [&](long begin, long end) {
+    linalg::blas::multiply(1.0, columns, sizes.middleCols(begin, end - begin), 1.0,
+                           now.middleCols(begin, end - begin));
+  });
+}
+
 Status ContactReduction::activate(const contact::ActiveSet& set) {
+  left_.clear();
+  joined_.clear();
   if (set == set_) return {};
-  set_.clear();
-  active_.clear();
+  before_ = active_;
+  forget();
   if (auto status = system_.take(set); !status) return status;
   set_ = set;
   active_ = system_.active();
+  if (list_changes()) {
+    response_.swap(before_response_);
+    follow();
+    return {};
+  }
   if (size() == 0) return {};
   system_.respond(Eigen::Map<Eigen::MatrixXd>(response_.data(), size(), window_.count + 1));
   return {};

@@ -4,9 +4,17 @@
 //
 //   D f = p_A - L_A z,   D = Phi_AA + I / beta        =>   f = f0 - T z,   [T f0] = D^-1 [L_A p_A]
 // L = N^T U: s x r; p: initial penetration. Everything is kept while the set stays the same.
+//
+// A set that follows another one, B, from which few slaves Q leave and which few slaves a join,
+// needs as many solutions instead of r + 1, with D of all slaves and X = [T f0]:
+//
+//   X = (X_B)_A + Y S,   Y = D_AA^-1 [D_AQ E_a],   S = [(X_B)_Q ; [L p]_a - D_aB X_B]
+//
+// Rows of A that B has not are 0 in (X_B)_A; E_a: unit columns.
 // Memory for all slaves is reserved by the constructor; nothing is allocated afterwards.
 #pragma once
 
+#include <memory>
 #include <vector>
 
 #include "common/contact/penalty.hpp"
@@ -20,22 +28,36 @@ namespace brainshift::inversion {
 
 class ContactReduction {
  public:
+  // A set follows the one before by at most so many changes, and this part of its slaves.
+  static constexpr int kMaxChanges = 96, kPart = 5;
+
   // Keeps references to the operators and to the system that it shares with ContactAtLoads.
-  ContactReduction(const CondensedOperators& operators, ModeWindow window, ContactSystem& system);
+  // The team shares the work.
+  ContactReduction(const CondensedOperators& operators, ModeWindow window, ContactSystem& system,
+                   ThreadTeam& team);
 
   // Errors of ContactSystem::take. set: one flag per slave, or empty for none.
   Status activate(const contact::ActiveSet& set);
   void forget() {
     set_.clear();
     active_.clear();
+    left_.clear();
+    joined_.clear();
   }
   int size() const { return static_cast<int>(active_.size()); }
   const std::vector<int>& active() const { return active_; }  // slaves, ascending
   const contact::ActiveSet& set() const { return set_; }
   // [T | f0], k x (r + 1)
-  Eigen::Map<const Eigen::MatrixXd> response() const {
-    return {response_.data(), size(), window_.count + 1};
+  Eigen::Map<const Eigen::MatrixXd> response() const { return response_of(response_, size()); }
+
+  // How the last activate() came from the set before: Q and a, ascending, Y (k x changes) and S
+  // (changes x (r + 1)). No changes: it did not.
+  int changes() const { return static_cast<int>(left_.size() + joined_.size()); }
+  const std::vector<int>& left() const { return left_; }
+  Eigen::Map<const Eigen::MatrixXd> change_columns() const {
+    return {columns_.get(), size(), changes()};
   }
+  auto change_sizes() const { return sizes_.topRows(changes()); }
 
   // f0 - T z, of the active slaves, N; those that pull are no solution. out: k.
   void forces_at(const VecX& z, Eigen::Ref<VecX> out) const;
@@ -48,12 +70,27 @@ class ContactReduction {
   VecX penetration_change(const VecX& dg, const VecX& dz, const VecX& df) const;
 
  private:
+  // A set that follows the one before: by at most so many changes, and this part of its slaves.
+
+  Eigen::Map<const Eigen::MatrixXd> response_of(const Eigen::MatrixXd& storage, int size) const {
+    return {storage.data(), size, window_.count + 1};
+  }
+  // left_ and joined_ for set_ after before_; false, and empty, when there are too many or none.
+  bool list_changes();
+  // response_ from before_response_.
+  void follow();
+
   const CondensedOperators& operators_;
   ModeWindow window_;
   ContactSystem& system_;
+  ThreadTeam& team_;
   contact::ActiveSet set_;
-  std::vector<int> active_;
-  Eigen::MatrixXd response_;  // storage; the first k x (r + 1) entries are used, column-major
+  std::vector<int> active_, before_, left_, joined_;
+  // Of the set and of the one before. Storage; the first k x (r + 1) entries are used,
+  // column-major.
+  Eigen::MatrixXd response_, before_response_;
+  std::unique_ptr<double[]> columns_;  // D_Ba, then Y
+  Eigen::MatrixXd sizes_;              // S
 };
 
 // ContactReach: how far the modes may move before the linear model of a set of active slaves is

@@ -59,12 +59,12 @@ bool ReleasedSlaves::make_inverse() {
     blas::multiply(1.0, e, response_.middleCols(begin, end - begin), 0.0,
                    loads_.middleCols(begin, end - begin));
   });
-  made_ = true;
   return true;
 }
 
 bool ReleasedSlaves::take(const contact::ActiveSet& pressing) {
-  if (!made_ && !make_inverse()) return false;
+  prepare();
+  if (!made_) return false;
   for (std::size_t i = 0; i < pressing.size(); ++i) released_set_[i] = pressing[i] ? 0 : 1;
   list_active(pressing, pressing_);
   return factor_.take(released_set_);
@@ -96,16 +96,52 @@ void ReleasedSlaves::solve(const VecX& z, Eigen::Ref<VecX> forces, VecX& penetra
   }
 }
 
-void ReleasedSlaves::respond(Eigen::Ref<Eigen::MatrixXd> out) {
-  const auto q = static_cast<Eigen::Index>(factor_.size());
-  const auto k = static_cast<Eigen::Index>(pressing_.size());
+Eigen::Map<Eigen::MatrixXd> ReleasedSlaves::gather_between() {
   const std::vector<int>& released = factor_.active();
-  Eigen::Map<Eigen::MatrixXd> between(gathered_.get(), q, k);
-  team_.split(k, [&](long begin, long end) {
+  Eigen::Map<Eigen::MatrixXd> between(gathered_.get(), factor_.size(),
+                                      static_cast<Eigen::Index>(pressing_.size()));
+  team_.split(between.cols(), [&](long begin, long end) {
     for (Eigen::Index j = begin; j < end; ++j) {
       gather(column(pressing_[static_cast<std::size_t>(j)]), released, between.col(j).data());
     }
   });
+  return between;
+}
+
+// D_AA^-1 D_AQ = -E_AQ E_QQ^-1 and D_AA^-1 = E_AA - E_AQ E_QQ^-1 E_QA.
+void ReleasedSlaves::respond_to_changes(const std::vector<int>& left,
+                                        const std::vector<int>& joined,
+                                        Eigen::Ref<Eigen::MatrixXd> out) {
+  const auto q = static_cast<Eigen::Index>(factor_.size());
+  const auto away = static_cast<Eigen::Index>(left.size());
+  const std::vector<int>& released = factor_.active();
+  const auto between = gather_between();
+  auto depth = response_.topLeftCorner(q, out.cols());
+  team_.split(out.cols(), [&](long begin, long end) {
+    for (Eigen::Index c = begin; c < end; ++c) {
+      if (c < away) {
+        const int slave = left[static_cast<std::size_t>(c)];
+        depth.col(c).setZero();
+        depth(std::lower_bound(released.begin(), released.end(), slave) - released.begin(), c) =
+            1.0;
+        out.col(c).setZero();
+      } else {
+        const double* own = column(joined[static_cast<std::size_t>(c - away)]);
+        gather(own, released, depth.col(c).data());
+        gather(own, pressing_, out.col(c).data());
+      }
+    }
+    if (q == 0) return;
+    auto own = depth.middleCols(begin, end - begin);
+    factor_.solve(own, work_.block(0, begin, factor_.work_rows(), end - begin));
+    blas::multiply_transposed(-1.0, between, own, 1.0, out.middleCols(begin, end - begin));
+  });
+}
+
+void ReleasedSlaves::respond(Eigen::Ref<Eigen::MatrixXd> out) {
+  const auto q = static_cast<Eigen::Index>(factor_.size());
+  const std::vector<int>& released = factor_.active();
+  const auto between = gather_between();
   auto depth = response_.topRows(q);
   team_.split(out.cols(), [&](long begin, long end) {
     for (Eigen::Index c = begin; c < end; ++c) {
@@ -176,6 +212,7 @@ ContactSystem::ContactSystem(const CondensedOperators& operators, ModeWindow win
       team_(team),
       pressing_(operators.compliance.data(), operators.num_slaves(), 1.0 / beta, team),
       released_(operators, window, beta, team),
+      modes_of_slave_(operators.slave_modes.middleCols(window.first, window.count).transpose()),
       work_(PrincipalFactor::most_work_rows(operators.num_slaves()), window.count + 1) {
   set_.reserve(static_cast<std::size_t>(operators.num_slaves()));
   active_.reserve(static_cast<std::size_t>(operators.num_slaves()));
@@ -228,14 +265,32 @@ void ContactSystem::respond(Eigen::Ref<Eigen::MatrixXd> out) {
   });
 }
 
+void ContactSystem::respond_to_changes(const std::vector<int>& left, const std::vector<int>& joined,
+                                       Eigen::Ref<Eigen::MatrixXd> out) {
+  if (by_released_) return released_.respond_to_changes(left, joined, out);
+  const auto away = static_cast<Eigen::Index>(left.size());
+  team_.split(out.cols(), [&](long begin, long end) {
+    for (Eigen::Index c = begin; c < end; ++c) {
+      if (c < away) {
+        gather(operators_.compliance.col(left[static_cast<std::size_t>(c)]).data(), active_,
+               out.col(c).data());
+      } else {
+        const int slave = joined[static_cast<std::size_t>(c - away)];
+        out.col(c).setZero();
+        out(std::lower_bound(active_.begin(), active_.end(), slave) - active_.begin(), c) = 1.0;
+      }
+    }
+    pressing_.solve(out.middleCols(begin, end - begin),
+                    work_.block(0, begin, pressing_.work_rows(), end - begin));
+  });
+}
+
 void ContactSystem::add_adjoint(const Eigen::Ref<const VecX>& felt, VecX& out) {
   if (by_released_) return released_.add_adjoint(felt, out);
   adjoint_ = felt;
   pressing_.solve(adjoint_, work_.topLeftCorner(pressing_.work_rows(), 1));
   for (int j = 0; j < size(); ++j) {
-    out += adjoint_[j] * operators_.slave_modes.row(active_[static_cast<std::size_t>(j)])
-                             .segment(window_.first, window_.count)
-                             .transpose();
+    out += adjoint_[j] * modes_of_slave_.col(active_[static_cast<std::size_t>(j)]);
   }
 }
 

@@ -9,7 +9,7 @@
 // swelling that presses 1,900 of 2,394 slaves on the skull costs a factor of 500 rows.
 //
 // Memory for all slaves is reserved by the constructor; nothing is allocated afterwards, but for
-// what ReleasedSlaves makes once.
+// what ReleasedSlaves makes once where prepare() was not called.
 #pragma once
 
 #include <memory>
@@ -34,15 +34,16 @@ namespace brainshift::inversion {
 //   D f + P = b with f_Q = 0, P_A = 0   =>   E_QQ P_Q = (E b)_Q,   f_A = (E b)_A - E_AQ P_Q
 //
 // with E = D^-1: a factor of q x q instead of k x k (ContactSystem). E and E [L p] depend on
-// the patient alone. They are made by the first take(), which costs s^3 flops and 8 s^2 bytes, in
-// scenes that need them: 0.3 s and 46 MiB for 2,394 slaves. Besides, nothing is allocated after
-// construction.
+// the patient alone. They are made by prepare(), else by the first take(), which costs s^3 flops
+// and 8 s^2 bytes: 0.3 s and 46 MiB for 2,394 slaves. Nothing else is allocated after construction.
 class ReleasedSlaves {
  public:
   // Keeps references to operators and team. beta: penalty, N/mm.
   ReleasedSlaves(const CondensedOperators& operators, ModeWindow window, double beta,
                  ThreadTeam& team);
 
+  // Makes E, so that no update pays for it. Where D cannot be factorised, take() says so.
+  void prepare() { made_ = made_ || make_inverse(); }
   // What follows is for this set of pressing slaves. false when D, or E of those that are
   // released, cannot be factorised.
   [[nodiscard]] bool take(const contact::ActiveSet& pressing);
@@ -52,6 +53,9 @@ class ReleasedSlaves {
   void solve(const VecX& z, Eigen::Ref<VecX> forces, VecX& penetration);
   // D_AA^-1 [L_A p_A], k x (r + 1).
   void respond(Eigen::Ref<Eigen::MatrixXd> out);
+  // ContactSystem::respond_to_changes.
+  void respond_to_changes(const std::vector<int>& left, const std::vector<int>& joined,
+                          Eigen::Ref<Eigen::MatrixXd> out);
   // out += L_A^T D_AA^-1 felt. felt: k; out: r.
   void add_adjoint(const Eigen::Ref<const VecX>& felt, VecX& out);
   // B = D_AA^-1 B for any right-hand sides, k rows. Allocates.
@@ -62,6 +66,8 @@ class ReleasedSlaves {
   Eigen::Map<Eigen::MatrixXd> inverse() const { return {inverse_.get(), slaves(), slaves()}; }
   const double* column(int slave) const { return inverse_.get() + slaves() * slave; }
   bool make_inverse();
+  // E_QA, q x k.
+  Eigen::Map<Eigen::MatrixXd> gather_between();
 
   const CondensedOperators& operators_;
   ModeWindow window_;
@@ -89,6 +95,8 @@ class ContactSystem {
   ContactSystem(const CondensedOperators& operators, ModeWindow window, double beta,
                 ThreadTeam& team);
 
+  // ReleasedSlaves::prepare().
+  void prepare() { released_.prepare(); }
   // What follows is for this set. set: one flag per slave, or empty for none. kSingularMatrix when
   // its compliance cannot be factorised; no set is held then.
   Status take(const contact::ActiveSet& set);
@@ -103,6 +111,11 @@ class ContactSystem {
              VecX& penetration);
   // [T f0] = (Phi_AA + I / beta)^-1 [L_A p_A], k x (r + 1).
   void respond(Eigen::Ref<Eigen::MatrixXd> out);
+  // Y = D_AA^-1 [D_AQ E_a], D = Phi + I / beta, for slaves Q that are not in the set and slaves a
+  // that are (E_a: their unit columns): what the forces follow when Q left the set and a joined it.
+  // At most r + 1 columns.
+  void respond_to_changes(const std::vector<int>& left, const std::vector<int>& joined,
+                          Eigen::Ref<Eigen::MatrixXd> out);
   // out += T^T felt. felt: one per active slave; out: r.
   void add_adjoint(const Eigen::Ref<const VecX>& felt, VecX& out);
   // B = (Phi_AA + I / beta)^-1 B for any right-hand sides, k rows. Allocates.
@@ -118,7 +131,8 @@ class ContactSystem {
   contact::ActiveSet set_;
   std::vector<int> active_;
   bool by_released_ = false;
-  Eigen::MatrixXd work_;  // of PrincipalFactor::solve
+  Eigen::MatrixXd modes_of_slave_;  // L^T, r x s
+  Eigen::MatrixXd work_;            // of PrincipalFactor::solve
   linalg::GrowingVector adjoint_;
 };
 

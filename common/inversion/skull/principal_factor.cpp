@@ -104,10 +104,27 @@ bool PrincipalFactor::make_base() {
 
 bool PrincipalFactor::gather_columns() {
   const Eigen::Index rows = base_size();
+  const auto has = [](const std::vector<int>& all, int one) {
+    return std::find(all.begin(), all.end(), one) != all.end();
+  };
+  const auto missing = static_cast<std::size_t>(
+      std::count_if(changed_.begin(), changed_.end(), [&](int one) { return !has(cached_, one); }));
+  if (cached_.size() + missing > kMaxChanges) {  // those that this set does not need make room
+    std::size_t kept = 0;
+    for (std::size_t j = 0; j < cached_.size(); ++j) {
+      if (!has(changed_, cached_[j])) continue;
+      if (kept < j) {
+        std::copy_n(cache_.get() + static_cast<Eigen::Index>(j) * total_, rows,
+                    cache_.get() + static_cast<Eigen::Index>(kept) * total_);
+      }
+      cached_[kept++] = cached_[j];
+    }
+    cached_.resize(kept);
+    if (kept + missing > kMaxChanges) return false;
+  }
   const std::size_t before = cached_.size();
   for (const int member : changed_) {
-    if (std::find(cached_.begin(), cached_.end(), member) != cached_.end()) continue;
-    if (cached_.size() == kMaxChanges) return false;
+    if (has(cached_, member)) continue;
     double* made = cache_.get() + static_cast<Eigen::Index>(cached_.size()) * total_;
     const int own_row = row_in_base_[static_cast<std::size_t>(member)];
     if (own_row < 0) {

@@ -13,8 +13,8 @@
 //
 // With V = K^-1 [D_Ba E_q] the Schur complement [D_aa 0; 0 0] - V^T V is quasi-definite, so that
 // two small Cholesky factors solve it (Vanderbei 1995, SIAM J. Optim. 5:100). Columns of V are kept
-// as long as the base is. k^3 / 3 flops for a new base, k^2 for a member that changes for the first
-// time.
+// as long as the base is and there is room. k^3 / 3 flops for a new base, k^2 for a member that
+// changes for the first time.
 //
 // Memory for all n is reserved by the constructor; nothing is allocated afterwards.
 #pragma once

@@ -38,7 +38,7 @@ TEST_F(ModePosteriorTest, ASourceContradictsOnlyWhereTheMeanOverTheHypothesesSay
   ThreadTeam team(1);
   const auto locator = std::make_shared<const geometry::TetLocator>(patient()->mesh);
   ContactSystem system(*brain, window, 1.0, team);
-  ContactReduction no_contact(*brain, window, system);
+  ContactReduction no_contact(*brain, window, system, team);
   const SparseData sagging = sagging_data(Boundary::kFixed, 0.3, 4);
   int agreed = 0, contradicted = 0, under_the_first = 0;
   for (int trial = 0; trial < 80; ++trial) {
@@ -52,8 +52,9 @@ TEST_F(ModePosteriorTest, ASourceContradictsOnlyWhereTheMeanOverTheHypothesesSay
     sampled.sample(data, RemainderVariances::Ones(), VecX::Ones(data.size()));
     ModePosterior posterior(window);
     posterior.reserve(data.size());
-    posterior.linearise(sampled, no_contact, team);
-    PriorStrengths strengths(brain->part_columns, window, SparseData::kMaxCommonErrors, true, 0.0, team);
+    posterior.linearise(sampled, no_contact, false, team);
+    PriorStrengths strengths(brain->part_columns, window, SparseData::kMaxCommonErrors, true, 0.0,
+                             team);
     ASSERT_TRUE(strengths.fit(posterior.gram(), posterior.right_hand_side()));
     Consistency found;
     ASSERT_TRUE(posterior.check_source(sampled, strengths, {"pointer", half, rest}, found));
@@ -80,6 +81,46 @@ TEST_F(ModePosteriorTest, ASourceContradictsOnlyWhereTheMeanOverTheHypothesesSay
   EXPECT_GT(agreed, 0) << under_the_first << " " << contradicted;
   EXPECT_GT(contradicted, 0);
   EXPECT_GT(under_the_first, 0);
+}
+
+TEST_F(ModePosteriorTest, ALinearModelThatFollowsTheSetBeforeIsThatOfItsOwn) {
+  const auto brain = operators(Boundary::kContact);
+  const ModeWindow window{1, brain->num_modes() - 1};
+  ThreadTeam team(2);
+  const auto locator = std::make_shared<const geometry::TetLocator>(patient()->mesh);
+  ContactSystem system(*brain, window, 5.0, team);
+  ContactReduction model(*brain, window, system, team);
+  const SparseData data = sagging_data(Boundary::kContact, 0.3, 4);
+  SampledOperators sampled(brain, locator, window, OutsideRegion::kExtend, team);
+  sampled.reserve(data.size());
+  ASSERT_TRUE(sampled.locate(data));
+  sampled.sample(data, RemainderVariances::Ones(), VecX::Ones(data.size()));
+  ModePosterior following(window), own(window);
+  following.reserve(data.size());
+  own.reserve(data.size());
+  Random random(2);
+  const int slaves = brain->num_slaves();
+  contact::ActiveSet set(static_cast<std::size_t>(slaves));
+  for (char& one : set) one = random.uniform() < 0.5 ? 1 : 0;
+  int followed = 0;
+  for (int step = 0; step < 10; ++step) {
+    ASSERT_TRUE(model.activate(set));
+    following.linearise(sampled, model, step > 0, team);
+    own.linearise(sampled, model, false, team);
+    followed += model.changes() > 0 ? 1 : 0;
+    const auto gram = own.gram(), found = following.gram();
+    const Eigen::MatrixXd expected = gram.triangularView<Eigen::Lower>();
+    const Eigen::MatrixXd difference = found.triangularView<Eigen::Lower>();
+    EXPECT_LT((difference - expected).norm(), 1e-10 * expected.norm());
+    EXPECT_LT((following.jacobian() - own.jacobian()).norm(), 1e-10 * own.jacobian().norm());
+    EXPECT_LT((following.right_hand_side() - own.right_hand_side()).norm(),
+              1e-10 * own.right_hand_side().norm());
+    for (int i = 0; i < 3; ++i) {
+      char& one = set[static_cast<std::size_t>(random.uniform() * slaves)];
+      one = one ? 0 : 1;
+    }
+  }
+  EXPECT_GT(followed, 8) << "the test shows nothing";
 }
 
 using Eigen::MatrixXd;

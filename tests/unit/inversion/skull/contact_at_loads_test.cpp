@@ -17,7 +17,7 @@ TEST(ContactReduction, PredictsForcesAndPenetrationAlsoForModesBeforeTheWindow) 
   const ModeWindow window{kBefore, kModes - kBefore};
   ContactSystem all_modes(brain, kWindow, kBeta, team), some_modes(brain, window, kBeta, team);
   ContactAtLoads contact(brain, kWindow, kBeta, true, all_modes, team);
-  ContactReduction model(brain, window, some_modes);
+  ContactReduction model(brain, window, some_modes, team);
   const VecX z = skull_loads(3, 1.0), step = skull_loads(4, 1e-5);
   ASSERT_TRUE(contact.solve(z));
   ASSERT_GT(contact.size(), 10);
@@ -33,6 +33,39 @@ TEST(ContactReduction, PredictsForcesAndPenetrationAlsoForModesBeforeTheWindow) 
   ASSERT_GT(change.norm(), 1e-6);
   EXPECT_LT((contact.forces() - forces - df).norm(), 1e-6 * df.norm());
   EXPECT_LT((contact.penetration() - penetration - change).norm(), 1e-6 * change.norm());
+}
+
+// Against a model that knows no set before, for sets of few slaves and of most.
+TEST(ContactReduction, FollowsTheSetBeforeToTheResponseOfItsOwn) {
+  const CondensedOperators brain = skull_operators(0.5);
+  ThreadTeam team{2};
+  ContactSystem system(brain, kWindow, kBeta, team), own_system(brain, kWindow, kBeta, team);
+  ContactReduction model(brain, kWindow, system, team);
+  Random random(6);
+  int followed = 0, most = 0;
+  for (const double share : {0.3, 0.5, 0.58, 0.62, 0.8, 0.95}) {
+    contact::ActiveSet set = random_set(random, share);
+    for (int step = 0; step < 12; ++step) {
+      ASSERT_TRUE(model.activate(set));
+      own_system.forget();
+      ContactReduction own(brain, kWindow, own_system, team);
+      ASSERT_TRUE(own.activate(set));
+      ASSERT_EQ(own.changes(), 0);
+      ASSERT_EQ(model.active(), own.active());
+      EXPECT_LT((model.response() - own.response()).norm(), 1e-10 * own.response().norm());
+      followed += model.changes() > 0 ? 1 : 0;
+      most += model.changes() > 0 && model.size() > ContactSystem::kMax * kSlaves ? 1 : 0;
+      for (int i = 0; i < 1 + step % 6; ++i) {
+        char& one = set[static_cast<std::size_t>(random.uniform() * kSlaves)];
+        one = one ? 0 : 1;
+      }
+    }
+  }
+  EXPECT_GT(followed, 50) << "the test shows nothing";
+  EXPECT_GT(most, 20) << "the test shows nothing";
+  ASSERT_TRUE(model.activate(contact::ActiveSet(kSlaves)));
+  EXPECT_EQ(model.changes(), 0);
+  EXPECT_EQ(model.size(), 0);
 }
 
 // Slaves that have changed at z in the linear model, by its definition.
@@ -57,7 +90,7 @@ struct Skull {
   CondensedOperators brain = skull_operators(0.5);
   ThreadTeam team{2};
   ContactSystem system{brain, kWindow, kBeta, team};
-  ContactReduction model{brain, kWindow, system};
+  ContactReduction model{brain, kWindow, system, team};
   ContactAtLoads contact;
   ContactReach reach;
 };

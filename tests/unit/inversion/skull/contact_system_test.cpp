@@ -75,6 +75,30 @@ TEST(PrincipalFactor, SolvesWhereSlavesOnlyJoinOrOnlyLeave) {
   }
 }
 
+TEST(PrincipalFactor, KeepsItsBaseWhateverMembersHaveChangedBefore) {
+  constexpr int kAll = 300, kBase = 150, kEach = 10;
+  CondensedOperators brain;
+  brain.compliance.resize(kAll, kAll);
+  for (int i = 0; i < kAll; ++i) {
+    for (int j = 0; j < kAll; ++j) brain.compliance(i, j) = 2.0 * std::exp(-std::abs(i - j) / 3.0);
+  }
+  ThreadTeam team(2);
+  PrincipalFactor factor(brain.compliance.data(), kAll, 1.0 / kBeta, team);
+  contact::ActiveSet base(kAll);
+  std::fill(base.begin(), base.begin() + kBase, char{1});
+  ASSERT_TRUE(factor.take(base));
+  for (int first = 0; first < kBase; first += kEach) {
+    contact::ActiveSet set = base;
+    for (int i = first; i < first + kEach; ++i) {
+      set[static_cast<std::size_t>(i)] = 0;
+      set[static_cast<std::size_t>(kBase + i)] = 1;
+    }
+    ASSERT_TRUE(factor.take(set));
+    EXPECT_EQ(factor.work_rows(), kBase + 2 * kEach);
+    expect_solves(brain, factor, set);
+  }
+}
+
 TEST(PrincipalFactor, ServesTheEmptySetAndComesBackFromIt) {
   const CondensedOperators brain = skull_operators(0.5);
   ThreadTeam team(2);
