@@ -2,6 +2,7 @@
 #include "client/tools/bridge/frame_collector.hpp"
 
 #include <cstring>
+#include <functional>
 #include <utility>
 
 #include "common/core/rigid_motion.hpp"
@@ -34,7 +35,16 @@ std::optional<std::pair<tracking::PixelType, std::string>> flat_pixels(const igt
   return std::nullopt;
 }
 
+bool is_same(const tracking::Link& a, const tracking::Link& b) {
+  return a.status == b.status && (a.status != tracking::LinkStatus::kOk ||
+                                  a.T_to_from.matrix().isApprox(b.T_to_from.matrix(), 1e-6));
+}
+
 }  // namespace
+
+bool FrameCollector::wants(const igtl::Envelope& image) const {
+  return options_.image_device.empty() || igtl::is_named(image, options_.image_device);
+}
 
 bool FrameCollector::full() const {
   return images() >= options_.max_images || pixel_bytes_ >= options_.max_pixel_bytes;
@@ -43,13 +53,17 @@ bool FrameCollector::full() const {
 FrameCollector::Moment* FrameCollector::moment_at(igtl::Timestamp time, TimePoint arrived) {
   const std::int64_t ns = time != 0 ? igtl::to_nanoseconds(time).count()
                                     : std::chrono::nanoseconds(arrived.time_since_epoch()).count();
+  if (waits_) return nullptr;
   if (!moments_.empty()) {
     const double ahead_s = 1e-9 * static_cast<double>(ns - moments_.rbegin()->first);
     if (ahead_s < -kBack_s) {
-      leave_out("the clock ran backwards: everything before it");
       moments_.clear();
-      images_ = pixel_bytes_ = 0;
-      last_image_.reset();
+      if (images_ > 0) {
+        left_out_["the clock ran backwards: images before it"] += images();
+        images_ = pixel_bytes_ = 0;
+        waits_ = true;
+        return nullptr;
+      }
     }
   }
   if (images_ == 0) {
@@ -64,27 +78,31 @@ FrameCollector::Moment* FrameCollector::moment_at(igtl::Timestamp time, TimePoin
 void FrameCollector::take(const igtl::Message& message, TimePoint arrived) {
   const igtl::Envelope& envelope = message.envelope;
   if (const auto* image = std::get_if<igtl::Image>(&message.content)) {
-    if (!options_.image_device.empty() && envelope.device != options_.image_device) return;
-    Moment& moment = *moment_at(envelope.timestamp, arrived);
-    if (!moment.image) moment.untimed = envelope.timestamp == 0;
-    take_image(*image, moment, arrived);
+    if (!wants(envelope)) return;
+    last_image_ = arrived;
+    Moment* moment = moment_at(envelope.timestamp, arrived);
+    if (moment == nullptr) return leave_out("image before the next pause");
+    take_image(*image, envelope.timestamp == 0, *moment);
   } else if (const auto* transform = std::get_if<igtl::Transform>(&message.content)) {
     const std::string* status = igtl::find(envelope.metadata, "TransformStatus");
-    take_transform(igtl::full_device(envelope), transform->matrix,
-                   status == nullptr || *status == "OK", *moment_at(envelope.timestamp, arrived));
+    if (Moment* moment = moment_at(envelope.timestamp, arrived)) {
+      take_transform(igtl::full_device(envelope), transform->matrix,
+                     status == nullptr || *status == "OK", *moment);
+    }
   } else if (const auto* tools = std::get_if<igtl::TrackingData>(&message.content)) {
+    Moment* moment = moment_at(envelope.timestamp, arrived);
+    if (moment == nullptr) return;
     for (const igtl::TrackedTool& tool : tools->tools) {
       const igtl::ToolState state = igtl::tool_state(envelope, tool.name);
       const bool names_two_frames = tracking::parse_transform_name(state.name).has_value();
       take_transform(names_two_frames ? state.name : state.name + kTracker, tool.matrix,
-                     state.valid, *moment_at(envelope.timestamp, arrived));
+                     state.valid, *moment);
     }
   }
 }
 
-void FrameCollector::take_image(const igtl::Image& image, Moment& moment, TimePoint arrived) {
+void FrameCollector::take_image(const igtl::Image& image, bool untimed, Moment& moment) {
   if (full()) return leave_out("the sweep is too long");
-  if (moment.image) return leave_out("a second image at the same time");
   auto flat = flat_pixels(image);
   if (!flat) return leave_out("image that is not one slice of 8 or 16 bit grey values");
   if (images_ == 0) {
@@ -93,11 +111,18 @@ void FrameCollector::take_image(const igtl::Image& image, Moment& moment, TimePo
   } else if (width_ != image.part[0] || height_ != image.part[1] || pixel_type_ != flat->first) {
     return leave_out("image of another size or type than the sweep's first");
   }
+  const std::size_t hash = std::hash<std::string>{}(flat->second);
+  if (moment.image) {
+    if (hash == moment.image_hash) return;
+    moment.ambiguous = true;
+    return leave_out("a second image at the same time, and the first: they cannot be told apart");
+  }
   moment.image = true;
+  moment.untimed = untimed;
+  moment.image_hash = hash;
   if (options_.keep_pixels) moment.pixels = std::move(flat->second);
   pixel_bytes_ += moment.pixels.size();
   ++images_;
-  last_image_ = arrived;
 }
 
 void FrameCollector::take_transform(const std::string& name, const igtl::Matrix34f& values,
@@ -106,26 +131,30 @@ void FrameCollector::take_transform(const std::string& name, const igtl::Matrix3
   if (!frames) return leave_out("transform " + name + ", which names no two frames");
   const std::string key = frames->name();
   pairs_.emplace(key, *frames);
-  tracking::Link& link = moment.links[key];
+  tracking::Link link;
   link.status = tracking::LinkStatus::kInvalid;
-  if (!valid) return;
   const Eigen::Matrix4d matrix = igtl::to_matrix(values);
   const bool scales =
       tracking::is_image_frame(frames->from) || tracking::is_image_frame(frames->to);
   const Status usable = scales ? check_affine(matrix) : check_rigid(matrix);
-  if (!usable) {
+  if (valid && !usable) {
     if (defects_.size() < kMaxDefects) defects_.push_back({0, key, usable.error().message});
-    return;
+  } else if (valid) {
+    link.status = tracking::LinkStatus::kOk;
+    if (scales) {
+      link.T_to_from.matrix() = matrix;
+    } else {
+      link.T_to_from = nearest_rigid(matrix);
+    }
   }
-  link.status = tracking::LinkStatus::kOk;
-  if (scales) {
-    link.T_to_from.matrix() = matrix;
-  } else {
-    link.T_to_from = nearest_rigid(matrix);
-  }
+  const auto [known, is_new] = moment.links.try_emplace(key, link);
+  if (is_new || is_same(known->second, link)) return;
+  known->second.status = tracking::LinkStatus::kInvalid;
+  moment.ambiguous = true;
+  leave_out("another pose " + key + " of the same time, and the image of that time");
 }
 
-CollectedSweep FrameCollector::finish() {
+CollectedSweep FrameCollector::finish(bool paused) {
   CollectedSweep sweep;
   const std::size_t count = moments_.size();
   for (tracking::Recording* each : {&sweep.moments, &sweep.images}) {
@@ -136,12 +165,13 @@ CollectedSweep FrameCollector::finish() {
     sweep.moments.links.push_back({frames, std::vector<tracking::Link>(count)});
   }
   // Seconds since the first moment: as doubles, times since 1970 would keep 0.2 microseconds only.
-  const std::int64_t first_ns = moments_.begin()->first;
+  const std::int64_t first_ns = moments_.empty() ? 0 : moments_.begin()->first;
   int at = 0;
   for (auto& [ns, moment] : moments_) {
     const double time_s = 1e-9 * static_cast<double>(ns - first_ns);
     sweep.moments.time_s.push_back(time_s);
-    sweep.moments.image_ok.push_back(moment.image ? 1 : 0);
+    const char ok = moment.image && !moment.ambiguous ? 1 : 0;
+    sweep.moments.image_ok.push_back(ok);
     for (tracking::LinkSeries& series : sweep.moments.links) {
       const auto link = moment.links.find(series.frames.name());
       if (link != moment.links.end()) series.samples[static_cast<std::size_t>(at)] = link->second;
@@ -151,22 +181,25 @@ CollectedSweep FrameCollector::finish() {
       sweep.image_ns.push_back(ns);
       sweep.untimed = sweep.untimed || moment.untimed;
       sweep.images.time_s.push_back(time_s);
-      sweep.images.image_ok.push_back(1);
+      sweep.images.image_ok.push_back(ok);
       sweep.images.pixels += moment.pixels;
       moment.pixels = {};
     }
     ++at;
   }
   sweep.moments.defects = std::exchange(defects_, {});
-  sweep.last_image = *last_image_;
+  sweep.last_image = last_image_.value_or(TimePoint{});
   for (const auto& [reason, times] : left_out_) {
     sweep.notes.push_back(std::to_string(times) + " left out: " + reason);
   }
+  if (!paused)
+    sweep.notes.emplace_back("the sweep ends here: what comes until a pause is left out");
   moments_.clear();
   pairs_.clear();
   left_out_.clear();
   images_ = pixel_bytes_ = 0;
-  last_image_.reset();
+  waits_ = !paused;
+  if (paused) last_image_.reset();
   return sweep;
 }
 

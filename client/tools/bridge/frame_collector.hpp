@@ -15,7 +15,10 @@
 // PlusToolkit/PlusLib.
 //
 // Images: one component of uint8, int16 or uint16, one slice; u along i, v along j (orientation MF,
-// in which PlusServer has them). Others are left out, and counted.
+// in which PlusServer has them). Others are left out, and counted. Different images of one time
+// cannot be told apart, nor can images whose time has different poses: they are not OK. What is
+// sent again changes nothing. When the clock runs back, and behind a sweep that is too long,
+// nothing is collected until a pause.
 #pragma once
 
 #include <chrono>
@@ -45,7 +48,7 @@ struct CollectedSweep {
   // Their own times, ns since 1970 UTC; of arrival where they have none (then `untimed`).
   std::vector<std::int64_t> image_ns;
   bool untimed = false;  // an image came without a time
-  // The images alone, with their pixels when they were kept.
+  // The images alone, with their pixels when they were kept; not OK where several had one time.
   tracking::Recording images;
   std::chrono::steady_clock::time_point last_image;  // when it came
   std::vector<std::string> notes;                    // what was left out
@@ -58,17 +61,28 @@ class FrameCollector {
   explicit FrameCollector(CollectorOptions options) : options_(std::move(options)) {}
 
   void take(const igtl::Message& message, TimePoint arrived);
+  // Images that came and could not be kept until they were taken: they are counted.
+  void lose(int images) {
+    if (images > 0) left_out_["image that came faster than it could be used"] += images;
+  }
+  // Of the device whose images are taken.
+  bool wants(const igtl::Envelope& image) const;
   int images() const { return static_cast<int>(images_); }
+  // The newest that came, whether it can be used or not.
   std::optional<TimePoint> last_image() const { return last_image_; }
   // No further image has room.
   bool full() const;
-  // What was collected; begins the next sweep. Precondition: images() > 0.
-  CollectedSweep finish();
+  // Nothing is collected until finish(true).
+  bool waits_for_a_pause() const { return waits_; }
+  // What was collected, perhaps no image; begins the next sweep. paused: no image came for a while.
+  CollectedSweep finish(bool paused = true);
 
  private:
   struct Moment {
     bool image = false;
     bool untimed = false;
+    bool ambiguous = false;      // different images or poses of one time
+    std::size_t image_hash = 0;  // of the pixels
     std::string pixels;
     std::map<std::string, tracking::Link> links;
   };
@@ -77,8 +91,9 @@ class FrameCollector {
   // A clock that runs back by more than this was set, or another recording is played.
   static constexpr double kBack_s = 1.0;
 
+  // Null: nothing is collected until a pause.
   Moment* moment_at(igtl::Timestamp time, TimePoint arrived);
-  void take_image(const igtl::Image& image, Moment& moment, TimePoint arrived);
+  void take_image(const igtl::Image& image, bool untimed, Moment& moment);
   void take_transform(const std::string& name, const igtl::Matrix34f& values, bool valid,
                       Moment& moment);
   void leave_out(const std::string& reason) { ++left_out_[reason]; }
@@ -86,6 +101,7 @@ class FrameCollector {
   CollectorOptions options_;
   std::map<std::int64_t, Moment> moments_;  // by ns
   std::size_t images_ = 0, pixel_bytes_ = 0;
+  bool waits_ = false;
   int width_ = 0, height_ = 0;
   tracking::PixelType pixel_type_ = tracking::PixelType::kUint8;
   std::optional<TimePoint> last_image_;

@@ -171,9 +171,12 @@ void Hub::serve_peers(const std::vector<short>& events) {
     Status status;
     if ((events[i] & kReadable) != 0) {
       Status answered;
-      status = peer.read([&](igtl::Message&& message) {
-        if (answered) answered = answer(peer, std::move(message));
-      });
+      status = peer.read({[&](igtl::Message&& message) {
+                            if (answered) answered = answer(peer, std::move(message));
+                          },
+                          [&](const std::string& sentence) {
+                            tell_(sentence + " (client " + peer.name() + ")");
+                          }});
       if (status) status = answered;
     }
     if (status && peer.wants_to_write()) status = peer.write();
@@ -245,8 +248,10 @@ Status Hub::run(int stop_descriptor) {
     if (upstream_ && polled[3].revents != 0) {
       const bool readable = (polled[3].revents & kReadable) != 0;
       const bool writable = (polled[3].revents & kWritable) != 0;
-      const auto hand = [this](igtl::Message&& message) { hand_on(std::move(message)); };
-      if (const auto news = upstream_->ready(readable, writable, Clock::now(), hand)) tell_(*news);
+      const Peer::Sinks sinks{
+          [this](igtl::Message&& message) { hand_on(std::move(message)); },
+          [this](const std::string& sentence) { tell_(sentence + " (from the server)"); }};
+      if (const auto news = upstream_->ready(readable, writable, Clock::now(), sinks)) tell_(*news);
     }
   }
 }

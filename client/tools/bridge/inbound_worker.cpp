@@ -72,10 +72,12 @@ InboundWorker::InboundWorker(Inbox inbox, std::string endpoint, std::optional<Cl
       pinned_case_(std::move(case_id)) {}
 
 void InboundWorker::post(igtl::Message&& message) {
+  if (!inbox_.uses(message)) return;
   const std::size_t bytes = message_bytes(message);
   const std::lock_guard lock(mutex_);
   while (!queue_.empty() && queued_bytes_ + bytes > kMaxQueuedBytes) {
     queued_bytes_ -= queue_.front().bytes;
+    if (std::holds_alternative<igtl::Image>(queue_.front().message.content)) ++lost_images_;
     queue_.pop_front();
     ++dropped_;
   }
@@ -98,15 +100,18 @@ void InboundWorker::run(const std::stop_token& stop) {
   while (!stop.stop_requested()) {
     std::deque<Item> items;
     std::uint64_t dropped = 0;
+    int lost = 0;
     {
       std::unique_lock lock(mutex_);
       news_.wait_for(lock, stop, kLook, [&] { return !queue_.empty(); });
       items.swap(queue_);
       queued_bytes_ = 0;
       dropped = std::exchange(dropped_, 0);
+      lost = std::exchange(lost_images_, 0);
     }
     if (dropped > 0)
       tell_(fmt::format("{} messages dropped: more came than could be used", dropped));
+    inbox_.lose(lost);
     for (const Item& item : items) {
       if (stop.stop_requested()) return;
       deal_with(inbox_.take(item.message, item.arrived), stop);

@@ -2,7 +2,7 @@
 // InboundWorker: hands observations made of OpenIGTLink messages to the daemon. Private to
 // client/bridge.
 //
-// Messages wait in a queue of limited size; the oldest image gives way, and is counted. A thread of
+// Messages wait in a queue of limited size; the oldest gives way, and is counted. A thread of
 // its own takes them, makes observations (Inbox), and submits them over a connection of its own, so
 // that neither tracing nor a slow daemon holds up what is sent to OpenIGTLink clients.
 //
@@ -69,6 +69,7 @@ class InboundWorker {
   std::deque<Item> queue_;
   std::size_t queued_bytes_ = 0;
   std::uint64_t dropped_ = 0;
+  int lost_images_ = 0;  // of these
   Followed followed_;
   std::string pinned_case_, pinned_model_;  // empty: none yet
 };

@@ -232,7 +232,8 @@ bool Inbox::uses(const igtl::Message& message) const {
     }
     return false;
   }
-  return true;
+  if (!std::holds_alternative<igtl::Image>(message.content)) return true;
+  return options_.wants_images() && collector_.wants(message.envelope);
 }
 
 Taken Inbox::take(const igtl::Message& message, TimePoint arrived) {
@@ -256,9 +257,10 @@ Taken Inbox::take(const igtl::Message& message, TimePoint arrived) {
     keep_transforms(message, *acquired);
     if (!options_.wants_images()) return taken;
     if (std::holds_alternative<igtl::Image>(message.content)) image_age_ = arrived - *acquired;
+    const bool waited = collector_.waits_for_a_pause();
     collector_.take(message, arrived);
-    if (!collector_.full()) return taken;
-    Taken sweep = end_sweep();
+    if (waited || (!collector_.full() && !collector_.waits_for_a_pause())) return taken;
+    Taken sweep = end_sweep(false);
     std::move(sweep.found.begin(), sweep.found.end(), std::back_inserter(taken.found));
     std::move(sweep.notes.begin(), sweep.notes.end(), std::back_inserter(taken.notes));
   }
@@ -270,7 +272,7 @@ Taken Inbox::tick(TimePoint now) {
   if (!last) return {};
   const double since_s = std::chrono::duration<double>(now - *last).count();
   if (since_s < options_.sweep_gap_s) return {};
-  return end_sweep();
+  return end_sweep(true);
 }
 
 Result<std::vector<ultrasound::Contour>> Inbox::contours_of(const CollectedSweep& sweep,
@@ -287,11 +289,12 @@ Result<std::vector<ultrasound::Contour>> Inbox::contours_of(const CollectedSweep
   return contours;
 }
 
-Taken Inbox::end_sweep() {
+Taken Inbox::end_sweep(bool paused) {
   Taken taken;
-  const CollectedSweep sweep = collector_.finish();
+  const CollectedSweep sweep = collector_.finish(paused);
   taken.notes = sweep.notes;
   const int images = sweep.images.num_frames();
+  if (images == 0) return taken;
   const auto contours = contours_of(sweep, taken.notes);
   if (!contours) {
     taken.notes.push_back(fmt::format("sweep of {} images: {}", images, contours.error().message));

@@ -100,7 +100,11 @@ class Inbox {
   igtl::StreamLimits from_peers() const;
   igtl::StreamLimits from_upstream() const;
 
+  // Whether a message is of a kind and name that the options ask for. Any thread.
+  bool uses(const igtl::Message& message) const;
   Taken take(const igtl::Message& message, TimePoint arrived);
+  // Images that were of use and got lost before they could be taken.
+  void lose(int images) { collector_.lose(images); }
   // Time has passed: a sweep may have ended.
   Taken tick(TimePoint now);
 
@@ -108,14 +112,13 @@ class Inbox {
   explicit Inbox(InboxOptions options);
   // When what the message says was so, by its own time; kInvalidArgument: too long ago, or ahead.
   Result<TimePoint> acquired_at(const igtl::Envelope& envelope, TimePoint arrived) const;
-  bool uses(const igtl::Message& message) const;
   void take_points(const igtl::Envelope& envelope, const Points& points,
                    const std::optional<TriangleSurface>& surface, TimePoint acquired, Taken& taken);
   void take_landmarks(const igtl::Envelope& envelope, const igtl::PointList& list,
                       TimePoint acquired, Taken& taken);
   Result<AffineTransform> T_ras_model(TimePoint at) const;
   void keep_transforms(const igtl::Message& message, TimePoint acquired);
-  Taken end_sweep();
+  Taken end_sweep(bool paused);
   Result<std::vector<ultrasound::Contour>> contours_of(const CollectedSweep& sweep,
                                                        std::vector<std::string>& notes) const;
 

@@ -17,9 +17,25 @@ std::string greeting() {
   return bytes;
 }
 
-// Reads what has come, kMaxReadAtOnce at most. A message that is well framed and cannot be
-// understood is left out.
-Status read_messages(Socket& socket, igtl::StreamReader& reader, const Peer::Sink& sink,
+// Tells of a message that is well framed and cannot be understood: the first, second, fourth, ...
+// Of an image an empty one is handed on, so that whoever counts images counts it.
+void refuse_message(const igtl::Header& header, const Error& error, const Peer::Sinks& sinks,
+                    std::uint64_t& refused) {
+  if (const std::uint64_t n = ++refused; (n & (n - 1)) == 0) {
+    sinks.tell(header.type + " of " + header.device + " left out: " + error.message +
+               (n == 1 ? "" : " (" + std::to_string(n) + " messages so far)"));
+  }
+  if (header.type != igtl::Image::kType) return;
+  igtl::Message empty;
+  empty.envelope.device = header.device;
+  empty.envelope.timestamp = header.timestamp;
+  empty.content = igtl::Image{};
+  sinks.take(std::move(empty));
+}
+
+// Reads what has come, kMaxReadAtOnce at most.
+Status read_messages(Socket& socket, igtl::StreamReader& reader, const Peer::Sinks& sinks,
+                     std::uint64_t& refused,
                      const std::function<void(std::uint16_t version)>& see_version) {
   std::array<char, 64 * 1024> buffer;
   for (std::size_t sum = 0; sum < Peer::kMaxReadAtOnce;) {
@@ -35,7 +51,11 @@ Status read_messages(Socket& socket, igtl::StreamReader& reader, const Peer::Sin
       see_version((*packet)->header.version);
       if ((*packet)->skipped) continue;
       auto message = igtl::decode((*packet)->header, (*packet)->body);
-      if (message) sink(std::move(*message));
+      if (message) {
+        sinks.take(std::move(*message));
+      } else {
+        refuse_message((*packet)->header, message.error(), sinks, refused);
+      }
     }
   }
   return {};
@@ -115,8 +135,8 @@ void Peer::take_version(std::uint16_t version) {
   waiting_state_ = state_;
 }
 
-Status Peer::read(const Sink& sink) {
-  return read_messages(socket_, reader_, sink,
+Status Peer::read(const Sinks& sinks) {
+  return read_messages(socket_, reader_, sinks, refused_,
                        [&](std::uint16_t version) { take_version(version); });
 }
 
@@ -154,7 +174,7 @@ Status Upstream::write() {
 }
 
 std::optional<std::string> Upstream::ready(bool readable, bool writable, TimePoint now,
-                                           const Peer::Sink& sink) {
+                                           const Peer::Sinks& sinks) {
   std::optional<std::string> news;
   if (writable && !connected_) {
     if (auto ok = socket_->connected(); !ok) return lost(ok.error(), now);
@@ -167,7 +187,7 @@ std::optional<std::string> Upstream::ready(bool readable, bool writable, TimePoi
   }
   if (readable && connected_) {
     const auto any_version = [](std::uint16_t) {};
-    if (auto ok = read_messages(*socket_, *reader_, sink, any_version); !ok) {
+    if (auto ok = read_messages(*socket_, *reader_, sinks, refused_, any_version); !ok) {
       return lost(ok.error(), now);
     }
   }

@@ -51,10 +51,15 @@ class Peer {
   bool wants_to_write() const;
   // Writes what the socket takes. kUnavailable: the peer is gone.
   Status write();
-  // Reads what has come, and hands on each message that is understood. kUnavailable: the peer is
-  // gone; kProtocol: it does not talk OpenIGTLink.
+  // Reads what has come, and hands on each message that is understood. One that is not is told; an
+  // image is then handed on empty, since images are counted. kUnavailable: the peer is gone;
+  // kProtocol: it does not talk OpenIGTLink.
   using Sink = std::function<void(igtl::Message&&)>;
-  Status read(const Sink& sink);
+  struct Sinks {
+    Sink take;
+    std::function<void(const std::string& sentence)> tell;
+  };
+  Status read(const Sinks& sinks);
 
  private:
   void take_version(std::uint16_t version);
@@ -66,6 +71,7 @@ class Peer {
   igtl::StreamReader reader_;
   std::uint16_t version_ = 1;
   std::uint64_t replaced_ = 0;
+  std::uint64_t refused_ = 0;  // messages that could not be understood
 
   BroadcastPtr shown_;    // the newest picture that was offered
   BroadcastPtr current_;  // being written
@@ -102,7 +108,7 @@ class Upstream {
   std::optional<std::string> tend(TimePoint now);
   // Goes on with the socket, which is ready.
   std::optional<std::string> ready(bool readable, bool writable, TimePoint now,
-                                   const Peer::Sink& sink);
+                                   const Peer::Sinks& sinks);
 
  private:
   std::optional<std::string> lost(const Error& error, TimePoint now);
@@ -114,6 +120,7 @@ class Upstream {
   std::optional<igtl::StreamReader> reader_;
   bool connected_ = false;
   bool told_ = false;  // that there is no connection
+  std::uint64_t refused_ = 0;
   std::string unsent_;
   TimePoint next_attempt_{};
 };

@@ -187,6 +187,7 @@ TEST(Inbox, KeepsNoMoreThanItUses) {
   EXPECT_TRUE(models.from_upstream().is_wanted("POINT"));
   EXPECT_FALSE(models.from_upstream().is_wanted("IMAGE"));
   EXPECT_FALSE(models.from_peers().is_wanted("STRING"));
+  EXPECT_FALSE(models.uses(inbox_message("Image", igtl::Image{})));
 }
 
 // A sweep over an ellipsoid at a known place, sent as PlusServer sends it.
@@ -317,6 +318,40 @@ TEST_F(InboxSweep, AContourWithoutItsImageIsLeftOutAndNoOtherMoves) {
     EXPECT_THAT(taken.found[0].told,
                 HasSubstr(fmt::format("sweep of {} images", sweep.frames - lost.size())));
   }
+}
+
+TEST_F(InboxSweep, BehindAClockThatRanBackNothingIsUsedUpToAPause) {
+  write_contours();
+  Inbox inbox = Inbox::open(options).value();
+  const auto early = [&](int ms) {
+    igtl::Image image;
+    image.geometry.dims = image.part = {3, 2, 1};
+    image.voxels = std::vector<std::uint8_t>(6);
+    auto made = inbox_message("Image_Reference", image);
+    made.envelope.timestamp = igtl::to_timestamp(milliseconds(5500));
+    return inbox.take(made, kInboxBegin + milliseconds(ms));
+  };
+  play(inbox);
+  EXPECT_THAT(early(2100).notes, Contains(HasSubstr("21 left out: the clock ran backwards")));
+  EXPECT_THAT(early(3000).notes, IsEmpty()) << "told once";
+  const Taken pause = inbox.tick(kInboxBegin + milliseconds(5100));
+  EXPECT_THAT(pause.found, IsEmpty());
+  EXPECT_THAT(pause.notes, ElementsAre(HasSubstr("1 left out: image before the next pause")));
+  const auto last = play(inbox);
+  EXPECT_THAT(inbox.tick(last + milliseconds(2100)).found, SizeIs(1));
+}
+
+TEST_F(InboxSweep, ContoursOfImagesThatCannotBeToldApartAreLeftOut) {
+  write_contours();
+  Inbox inbox = Inbox::open(options).value();
+  const auto last = play(inbox);
+  auto other = inbox_message("ProbeToTracker", igtl::Transform{igtl::Matrix34f::Identity()});
+  other.envelope.timestamp = igtl::to_timestamp(milliseconds(6500));
+  inbox.take(other, last);
+  const Taken taken = inbox.tick(last + milliseconds(2100));
+  ASSERT_THAT(taken.found, SizeIs(1)) << testing::PrintToString(taken.notes);
+  EXPECT_THAT(taken.notes,
+              Contains(HasSubstr("contours left out: 1 because the image is invalid")));
 }
 
 TEST_F(InboxSweep, ASeedIsTraced) {

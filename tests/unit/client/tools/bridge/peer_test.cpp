@@ -4,9 +4,11 @@
 #include <sys/socket.h>
 
 #include <array>
+#include <set>
 
 #include "client/tools/bridge/peer.hpp"
 #include "client/tools/bridge/socket.hpp"
+#include "common/igtl/crc64.hpp"
 #include "tests/support/igtl_peer.hpp"
 #include "tests/support/results.hpp"
 
@@ -72,16 +74,16 @@ struct Pair {
   Peer ours;
   IgtlPeer theirs;
 };
-Pair connected() {
+Pair connected(std::set<std::string, std::less<>> wanted = {"GET_STATUS", "POINT"}) {
   std::array<int, 2> ends{};
   EXPECT_EQ(::socketpair(AF_UNIX, SOCK_STREAM, 0, ends.data()), 0);
   ::fcntl(ends[0], F_SETFL, O_NONBLOCK);
   igtl::StreamLimits limits;
-  limits.wanted = {"GET_STATUS", "POINT"};
+  limits.wanted = std::move(wanted);
   return {Peer(Socket(ends[0]), limits), IgtlPeer(ends[1])};
 }
 
-void ignore(igtl::Message&&) {}
+const Peer::Sinks ignore{[](igtl::Message&&) {}, [](const std::string&) {}};
 
 // Writes and reads in turns until the device has come.
 std::optional<test_support::Received> next_of(Pair& pair, std::string_view device) {
@@ -192,7 +194,9 @@ TEST(Peer, RepliesComeBeforeTheNextMessageAndAreLimited) {
 TEST(Peer, HandsOnWhatIsWantedAndNoticesTheEnd) {
   Pair pair = connected();
   std::vector<std::string> devices;
-  const auto note = [&](igtl::Message&& message) { devices.push_back(message.envelope.device); };
+  const Peer::Sinks note{
+      [&](igtl::Message&& message) { devices.push_back(message.envelope.device); },
+      [](const std::string& sentence) { ADD_FAILURE() << sentence; }};
   igtl::Envelope envelope;
   envelope.device = "a";
   pair.theirs.send(envelope, igtl::PointList{});
@@ -204,6 +208,26 @@ TEST(Peer, HandsOnWhatIsWantedAndNoticesTheEnd) {
   EXPECT_THAT(devices, testing::ElementsAre("a", "c"));
   { const IgtlPeer closes = std::move(pair.theirs); }
   refusal_of(pair.ours.read(note), ErrorCode::kUnavailable);
+}
+
+TEST(Peer, AMessageThatIsNotUnderstoodIsToldAndAnImageCountsAllTheSame) {
+  Pair pair = connected({"IMAGE", "POINT"});
+  std::vector<std::string> told, taken;
+  const Peer::Sinks sinks{
+      [&](igtl::Message&& message) { taken.push_back(message.envelope.device); },
+      [&](const std::string& sentence) { told.push_back(sentence); }};
+  const auto send = [&](const std::string& type, const std::string& device) {
+    const std::string body = "nonsense";
+    igtl::Header header{1, type, device, 0, body.size(), igtl::crc64(body)};
+    pair.theirs.send(igtl::encode_header(header) + body);
+  };
+  for (int i = 0; i < 5; ++i) send("POINT", "Tum");
+  send("IMAGE", "US");
+  EXPECT_TRUE(pair.ours.read(sinks));
+  EXPECT_THAT(taken, testing::ElementsAre("US"));
+  ASSERT_EQ(told.size(), 3u) << "the first, the second, the fourth";
+  EXPECT_THAT(told[0], testing::StartsWith("POINT of Tum left out: POINT: "));
+  EXPECT_THAT(told[2], testing::EndsWith("(4 messages so far)"));
 }
 
 TEST(Peer, WhatIsNoOpenIgtLinkEndsIt) {
