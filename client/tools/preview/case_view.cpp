@@ -17,7 +17,7 @@
 #include "common/geometry/mask.hpp"
 #include "common/geometry/surface.hpp"
 #include "common/io/config/config_file.hpp"
-#include "common/io/geometry/image_file.hpp"
+#include "common/io/geometry/label_map_file.hpp"
 
 namespace brainshift::client {
 namespace {
@@ -117,7 +117,7 @@ Result<CaseView> view_case(const std::filesystem::path& case_file, const Progres
   CaseView view;
   view.config = *config;
   if (!config->mri.empty()) {
-    auto mri = io::read_nifti(config->mri);
+    auto mri = io::read_volume(config->mri);
     if (!mri) return tl::unexpected(mri.error());
     view.background = std::move(*mri);
   } else if (inputs->brain) {
