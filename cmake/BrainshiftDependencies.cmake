@@ -71,6 +71,15 @@ add_library(brainshift_nifti INTERFACE)
 target_include_directories(brainshift_nifti SYSTEM INTERFACE ${NIFTI_INCLUDE_DIR})
 target_link_libraries(brainshift_nifti INTERFACE ${NIFTI_LIBRARY} ${ZNZ_LIBRARY} ZLIB::ZLIB)
 
+# DCMTK's own CMake package asks for every library that any of its modules links.
+find_path(DCMTK_INCLUDE_DIR dcmtk/dcmdata/dctk.h REQUIRED)
+add_library(brainshift_dcmtk INTERFACE)
+target_include_directories(brainshift_dcmtk SYSTEM INTERFACE ${DCMTK_INCLUDE_DIR})
+foreach(name dcmjpeg dcmjpls dcmdata oflog ofstd)
+  find_library(DCMTK_${name}_LIBRARY ${name} REQUIRED)
+  target_link_libraries(brainshift_dcmtk INTERFACE ${DCMTK_${name}_LIBRARY})
+endforeach()
+
 if(BRAINSHIFT_BUILD_TESTS)
   find_package(GTest REQUIRED)
   find_package(benchmark REQUIRED)

@@ -40,7 +40,7 @@ struct TumourEllipsoid {
   Vec3 semi_axes_mm = Vec3::Ones();
 };
 struct TumourLabel {
-  std::filesystem::path path;               // NIfTI or NRRD label volume
+  std::filesystem::path path;               // NIfTI, NRRD or .mgz label volume
   std::vector<int> labels = {1};            // the tumour is all of them together
   std::optional<std::string> segment = {};  // of a .seg.nrrd, by name; then labels do not matter
 };
@@ -223,7 +223,7 @@ struct CaseConfig {
   std::string case_id;
   std::filesystem::path file;  // where it was read from; empty for a case made in memory
 
-  std::filesystem::path mri;    // T1 MRI (NIfTI); pictures are drawn on it
+  std::filesystem::path mri;    // T1 MRI; pictures are drawn on it
   std::filesystem::path brain;  // mask or skull-stripped MRI: voxels > 0 are brain
 
   std::variant<MeshGeneration, MeshFile> mesh = MeshGeneration{};

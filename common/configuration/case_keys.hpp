@@ -84,7 +84,8 @@ void visit_kind(A& a, V& v) {
 template <typename A, Of<TumourLabel> V>
 void visit_kind(A& a, V& v) {
   a.section({kind_name(v), "", "A label in a segmentation"}, Need::kRequired, [&] {
-    a({"file", "", "The segmentation: NIfTI, or NRRD as 3D Slicer writes it (.nrrd, .seg.nrrd)"},
+    a({"file", "",
+       "The segmentation: NIfTI, .mgz, or NRRD as 3D Slicer writes it (.nrrd, .seg.nrrd)"},
       v.path, Need::kRequired);
     a({"label", "", "The tumour's label, or a list of labels that are the tumour together", "",
        "Not used where the file names its segments."},
@@ -405,11 +406,11 @@ void visit(A& a, V& v) {
   };
   a({"case_id", "", "Name of the case, in every message and report"}, v.case_id, Need::kRequired);
   a.section({"images"}, Need::kOptional, [&] {
-    a({"mri", "", "T1 MRI (NIfTI) that pictures are drawn on", "",
+    a({"mri", "", "T1 MRI (NIfTI, NRRD or .mgz) that pictures are drawn on", "",
        "Without it reports have no pictures."},
       v.mri);
-    a({"brain", "", "Brain mask or skull-stripped MRI (NIfTI); voxels > 0 are brain", "",
-       "Needed when the mesh is generated."},
+    a({"brain", "", "Brain mask or skull-stripped MRI (NIfTI, NRRD or .mgz); voxels > 0 are brain",
+       "", "Needed when the mesh is generated."},
       v.brain);
   });
   a.one_of({"mesh", "", "Exactly one of `generate` (mesh from images.brain) and `file`", "",

@@ -23,6 +23,7 @@ namespace brainshift::client {
 
 // Each adds a subcommand to `app`. When app.parse() has read the arguments, it runs the chosen
 // one, which stores its outcome in `status`. `status` must outlive the parsing.
+void add_init(CLI::App& app, Status& status);
 void add_preview(CLI::App& app, Status& status);
 void add_simulate(CLI::App& app, Status& status);
 void add_replay(CLI::App& app, Status& status);

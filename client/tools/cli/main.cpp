@@ -15,7 +15,8 @@ int main(int argc, char** argv) {
   umask(077);  // files hold a patient's data
   using namespace brainshift;
   CLI::App app{
-      "brainshift: look at a case before it is prepared; simulate surgeries with known truth, "
+      "brainshift: write a first case of a patient; look at a case before it is prepared; simulate "
+      "surgeries with known truth, "
       "replay recorded ones to brainshiftd, and report how well the deformation was recovered; "
       "solve single forward problems on any mesh; import recordings of tracked ultrasound and "
       "landmarks; register patients by fiducials; check, export and mend journals; watch a "
@@ -37,10 +38,11 @@ int main(int argc, char** argv) {
 
   Status status;
   for (const auto add :
-       {client::add_preview, client::add_simulate, client::add_replay, client::add_report,
-        client::add_solve, client::add_import, client::add_register, client::add_stereo,
-        client::add_journal, client::add_export, client::add_watch, client::add_view,
-        client::add_bridge, client::add_status, client::add_top, client::add_keys}) {
+       {client::add_init, client::add_preview, client::add_simulate, client::add_replay,
+        client::add_report, client::add_solve, client::add_import, client::add_register,
+        client::add_stereo, client::add_journal, client::add_export, client::add_watch,
+        client::add_view, client::add_bridge, client::add_status, client::add_top,
+        client::add_keys}) {
     add(app, status);
   }
 
@@ -48,10 +50,11 @@ int main(int argc, char** argv) {
   const auto commands = app.get_subcommands(nullptr);
   const auto named = [&](const CLI::App* command) { return command->check_name(argv[1]); };
   if (argc > 1 && argv[1][0] != '-' && std::none_of(commands.begin(), commands.end(), named)) {
-    client::print_error("unknown command \"" + std::string(argv[1]) +
-                        "\": must be preview, simulate, replay, report, solve, import, register, "
-                        "stereo, journal, export, "
-                        "watch, view, bridge, status, top or keys (see brainshift --help)");
+    client::print_error(
+        "unknown command \"" + std::string(argv[1]) +
+        "\": must be init, preview, simulate, replay, report, solve, import, register, "
+        "stereo, journal, export, "
+        "watch, view, bridge, status, top or keys (see brainshift --help)");
     return kExitBadInput;
   }
   try {

@@ -8,13 +8,16 @@
 #include <cmath>
 #include <map>
 #include <numbers>
+#include <numeric>
 #include <utility>
 
 #include "common/anatomy/brain_mesh.hpp"
 #include "common/anatomy/brain_model_builder.hpp"
+#include "common/geometry/closest_point.hpp"
+#include "common/geometry/mask.hpp"
 #include "common/geometry/surface.hpp"
 #include "common/io/config/config_file.hpp"
-#include "common/io/geometry/image_file.hpp"
+#include "common/io/geometry/label_map_file.hpp"
 
 namespace brainshift::client {
 namespace {
@@ -26,6 +29,11 @@ constexpr double kLongBrain_mm = 220.0;
 constexpr double kLargeTumour = 0.1;  // of the brain's volume
 constexpr double kFewSlaves = 0.01;   // of the surface's nodes
 constexpr double kMm3PerCc = 1000.0;
+constexpr double kFarProjection_mm = 10.0;
+constexpr double kSmallBrain_cc = 900.0, kLargeBrain_cc = 1900.0;
+constexpr double kAcross_mm = 3.0;  // from the surface, where the MRI is looked at
+constexpr double kDark = 0.3;       // of the median
+constexpr double kLeastContrast = 0.2, kLargestDark = 0.15;
 
 void set_roles(CaseView& view, const std::vector<NodeIndex>& node_of_vertex,
                const std::vector<NodeIndex>& craniotomy, const std::vector<NodeIndex>& brainstem,
@@ -75,6 +83,11 @@ Vec3 extent_of(const TriangleSurface& surface) {
   return surface.vertices.rowwise().maxCoeff() - surface.vertices.rowwise().minCoeff();
 }
 
+double distance_to_surface(const Vec3& x, const TriangleSurface& surface) {
+  const auto index = geometry::ClosestPointIndex::build(surface);
+  return index ? index->closest(x).distance_mm : 0.0;
+}
+
 double distance_to_vertices(const Vec3& x, const TriangleSurface& surface) {
   return (surface.vertices.colwise() - x).colwise().norm().minCoeff();
 }
@@ -104,7 +117,7 @@ Result<CaseView> view_case(const std::filesystem::path& case_file, const Progres
   CaseView view;
   view.config = *config;
   if (!config->mri.empty()) {
-    auto mri = io::read_nifti(config->mri);
+    auto mri = io::read_volume(config->mri);
     if (!mri) return tl::unexpected(mri.error());
     view.background = std::move(*mri);
   } else if (inputs->brain) {
@@ -116,6 +129,9 @@ Result<CaseView> view_case(const std::filesystem::path& case_file, const Progres
   } else {
     view.problems.push_back(model.error().message);
     take_parts(view, *inputs, progress);
+  }
+  if (view.brain.num_vertices() > 0) {
+    view.projection_mm = distance_to_surface(config->craniotomy.centre_mm, view.brain);
   }
   return view;
 }
@@ -183,8 +199,9 @@ std::vector<std::string> facts(const CaseView& view) {
                                 place_text(centre_of(view.tumour))));
   }
   if (const auto opening = opening_of(view)) {
-    lines.push_back(fmt::format("craniotomy: at {}; it faces {}", place_text(opening->centre),
-                                direction_text(opening->normal)));
+    lines.push_back(fmt::format(
+        "craniotomy: at {}; it faces {}; craniotomy.centre_mm was projected by {:.1f} mm",
+        place_text(opening->centre), direction_text(opening->normal), view.projection_mm));
     if (view.tumour.num_vertices() > 0) {
       lines.push_back(fmt::format("tumour's nearest point: {:.0f} mm from the craniotomy's centre",
                                   distance_to_vertices(opening->centre, view.tumour)));
@@ -205,7 +222,62 @@ std::vector<std::string> facts(const CaseView& view) {
   return lines;
 }
 
+std::optional<MriFit> fit_of_mri(const CaseView& view) {
+  if (view.config.mri.empty() || !view.background || view.brain.num_vertices() == 0) {
+    return std::nullopt;
+  }
+  const geometry::Interpolator mri(*view.background);
+  const Points normals = geometry::vertex_normals(view.brain);
+  std::vector<double> below, above;
+  for (Eigen::Index v = 0; v < normals.cols(); ++v) {
+    const Vec3 x = view.brain.vertices.col(v), step = kAcross_mm * normals.col(v);
+    below.push_back(mri(x - step)), above.push_back(mri(x + step));
+  }
+  const auto mean = [](const std::vector<double>& of) {
+    return std::accumulate(of.begin(), of.end(), 0.0) / static_cast<double>(of.size());
+  };
+  const double difference = mean(below) - mean(above);
+  std::sort(below.begin(), below.end());
+  const double median = below[below.size() / 2];
+  if (!(median > 0.0)) return MriFit{0.0, 1.0};
+  const auto lit = std::lower_bound(below.begin(), below.end(), kDark * median);
+  return MriFit{difference / median,
+                static_cast<double>(lit - below.begin()) / static_cast<double>(below.size())};
+}
+
 namespace {
+
+void doubt_projection(const CaseView& view, std::vector<std::string>& lines) {
+  if (view.projection_mm <= kFarProjection_mm) return;
+  const Vec3& centre = view.config.craniotomy.centre_mm;
+  const bool centimetres = distance_to_surface(10.0 * centre, view.brain) < kFarProjection_mm;
+  lines.push_back(fmt::format(
+      "craniotomy.centre_mm = [{:g}, {:g}, {:g}] is {:.0f} mm from the brain's surface, to which "
+      "it "
+      "is projected{}",
+      centre[0], centre[1], centre[2], view.projection_mm,
+      centimetres ? "; ten times as far out it lies on the surface: centimetres?" : ""));
+}
+
+void doubt_volume(const CaseView& view, std::vector<std::string>& lines) {
+  const double cc = geometry::enclosed_volume(view.brain) / kMm3PerCc;
+  if (cc >= kSmallBrain_cc && cc <= kLargeBrain_cc) return;
+  lines.push_back(fmt::format("the brain has {:.0f} cc; an adult's has {:.0f} to {:.0f}: {}", cc,
+                              kSmallBrain_cc, kLargeBrain_cc,
+                              cc > kLargeBrain_cc
+                                  ? "is images.brain skull-stripped, and without the face?"
+                                  : "does images.brain hold the whole brain?"));
+}
+
+void doubt_mri(const CaseView& view, std::vector<std::string>& lines) {
+  const auto fit = fit_of_mri(view);
+  if (!fit || (fit->contrast >= kLeastContrast && fit->dark <= kLargestDark)) return;
+  lines.push_back(fmt::format(
+      "the brain's surface does not lie on the brain in images.mri: just inside the image is "
+      "brighter than outside by {:.2f} of its median (a T1: about 0.5), and {:.0f} % of it is "
+      "dark: are mask and MRI of one space?",
+      fit->contrast, 100.0 * fit->dark));
+}
 
 void doubt_opening(const CaseView& view, const OpeningView& opening,
                    std::vector<std::string>& lines) {
@@ -247,6 +319,9 @@ std::vector<std::string> doubts(const CaseView& view) {
         "mesh",
         longest));
   }
+  doubt_volume(view, lines);
+  doubt_mri(view, lines);
+  doubt_projection(view, lines);
   if (const auto opening = opening_of(view)) doubt_opening(view, *opening, lines);
   const Vec3& stem = view.config.brainstem.centre_mm;
   if (view.config.brainstem.radius_mm > 0.0 && stem.z() > middle_of(view.brain).z()) {

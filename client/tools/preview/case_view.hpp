@@ -29,6 +29,8 @@ struct CaseView {
   int nodes = 0;                         // of the mesh
   int tets = 0;
   std::vector<NodeRole> roles;  // of the brain's vertices; empty when no sets can be selected
+  // From craniotomy.centre_mm to the brain's surface, mm; 0 when there is no brain.
+  double projection_mm = 0.0;
   // Along gravity, mm; with roles only.
   double fluid_plane_depth_mm = 0.0;
   double slave_plane_depth_mm = 0.0;
@@ -61,13 +63,27 @@ std::string direction_text(const Vec3& direction);
 // What the pictures show, as sentences with figures: sizes, places, distances, angles.
 std::vector<std::string> facts(const CaseView& view);
 
+// How well the brain's surface lies in a T1 MRI: there the brain, 3 mm below the surface, is
+// brighter than what is around it, 3 mm above.
+struct MriFit {
+  double contrast = 0.0;  // mean below less mean above, over the median below
+  double dark = 0.0;      // share of the places below that are darker than 0.3 of the median
+};
+// None without MRI or without brain. Colin27 in its place: about 0.5 and 0.00; 10 mm beside it 0.17
+// and 0.05; 30 mm beside it 0.05 and 0.18.
+std::optional<MriFit> fit_of_mri(const CaseView& view);
+
 // What is unusual enough for a second look: each a sentence that names the key to look at. A wrong
 // side, a wrong axis and metres for millimetres show here.
 //   what the builder noted: a tumour that sticks out of the brain and is cut
 //   tumour and opening on different sides of the brain, each more than 10 mm from its middle
 //   an opening farther than 60 mm from the tumour's surface
 //   an opening that faces down: the brain would sag out of it
-//   a brain not between 100 and 220 mm long
+//   craniotomy.centre_mm farther than 10 mm from the surface that it is projected to; centimetres
+//   where ten times the centre lies on it
+//   a brain not between 100 and 220 mm long, or not of 900 to 1900 cc
+//   a brain that is not in its place in the MRI (fit_of_mri: contrast below 0.2, or more than
+//   0.15 dark)
 //   a brainstem above the brain's centre
 //   a tumour that takes more than a tenth of the brain's volume
 //   fewer slaves than a hundredth of the surface's nodes

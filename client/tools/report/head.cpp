@@ -5,7 +5,7 @@
 #include <cctype>
 #include <tuple>
 
-#include "common/io/geometry/image_file.hpp"
+#include "common/io/geometry/label_map_file.hpp"
 #include "common/io/geometry/mesh_file.hpp"
 #include "common/patient/read_patient.hpp"
 
@@ -30,7 +30,7 @@ Result<Head> load_head(const std::filesystem::path& case_file, const Progress& p
 
   Head head;
   if (!patient->config.mri.empty()) {
-    auto mri = io::read_nifti(patient->config.mri);
+    auto mri = io::read_volume(patient->config.mri);
     if (!mri) return tl::unexpected(mri.error());
     head.mri = std::move(*mri);
   }

@@ -9,7 +9,6 @@
 #include "common/configuration/case_keys.hpp"
 #include "common/io/config/key_reader.hpp"
 #include "common/io/files/file_access.hpp"
-#include "common/io/geometry/image_file.hpp"
 #include "common/io/geometry/label_map_file.hpp"
 #include "common/io/geometry/mesh_file.hpp"
 
@@ -156,7 +155,7 @@ Result<CaseInputs> load_case_inputs(const CaseConfig& config) {
   if (const auto* file = std::get_if<MeshFile>(&config.mesh)) {
     loader.load(file->path, read_tet_mesh, inputs.mesh);
   } else {
-    loader.load(config.brain, read_nifti, inputs.brain);
+    loader.load(config.brain, read_volume, inputs.brain);
   }
   if (const auto* label = std::get_if<TumourLabel>(&config.tumour)) {
     const LabelChoice choice{label->segment.value_or(""), label->labels.front()};

@@ -21,6 +21,9 @@ struct YamlDocument::State {
   YAML::Node root;
   std::map<std::string, int> line_of_key;  // 1-based
   std::string problem;
+  std::vector<std::string>
+      missing;              // required keys, told together unless something was wrong before
+  int line_of_missing = 0;  // of the first one's section
 
   // 0: unknown.
   int line_of(const std::string& full_key) const {
@@ -29,7 +32,19 @@ struct YamlDocument::State {
   }
 
   void fail_at(int line, const std::string& message) {
-    if (!problem.empty()) return;
+    if (!problem.empty() || !missing.empty()) return;
+    set_problem(line, message);
+  }
+  // The keys of a section that is missing itself are not told.
+  void miss(const std::string& section, const std::string& key) {
+    const bool told = std::any_of(missing.begin(), missing.end(), [&](const std::string& above) {
+      return (section + ".").starts_with(above + ".");
+    });
+    if (!problem.empty() || told) return;
+    if (missing.empty()) line_of_missing = line_of(section);
+    missing.push_back(key);
+  }
+  void set_problem(int line, const std::string& message) {
     problem = file.string();
     if (line > 0) problem.append(":").append(std::to_string(line));
     problem.append(": ").append(message);
@@ -169,6 +184,12 @@ YamlSection YamlDocument::root() {
 }
 
 Status YamlDocument::status() const {
+  const std::vector<std::string>& missing = state_->missing;
+  if (state_->problem.empty() && missing.size() == 1) {
+    state_->set_problem(state_->line_of_missing, missing.front() + ": key is missing");
+  } else if (state_->problem.empty() && !missing.empty()) {
+    state_->set_problem(0, joined(missing) + ": keys are missing");
+  }
   if (state_->problem.empty()) return {};
   return invalid(state_->problem);
 }
@@ -222,7 +243,7 @@ bool YamlSection::has(const std::string& key) {
 std::shared_ptr<YamlSection::Node> YamlSection::take(const std::string& key, Presence presence) {
   if (!has(key)) {
     if (presence == Presence::kRequired) {
-      state_->fail_at(state_->line_of(prefix_), full_key(key) + ": key is missing");
+      state_->miss(prefix_, full_key(key));
     }
     return nullptr;
   }

@@ -2,7 +2,8 @@
 // A YAML document read strictly: every key must be known, every value of its type, nothing twice.
 //
 // Usage: open a document, take values by key, ask for status(). The first problem wins and
-// all later calls do nothing, so a reader is a plain list of keys:
+// all later calls do nothing, so a reader is a plain list of keys. Keys that are missing are told
+// together, in one message.
 //   YamlDocument document = YamlDocument::parse(text, file);
 //   YamlSection material = document.root().section("material");
 //   material.number("poisson_ratio", config.material.poisson_ratio);   // optional: default stays

@@ -17,6 +17,7 @@
 #include "common/io/files/file_access.hpp"
 #include "common/io/files/nrrd_header.hpp"
 #include "common/io/geometry/image_file.hpp"
+#include "common/io/geometry/mgh_file.hpp"
 
 namespace brainshift::io {
 namespace {
@@ -319,7 +320,10 @@ Result<VoxelImage> parse_nrrd(const std::string& content, const LabelChoice& cho
 Result<VoxelImage> read_label_map(const fs::path& path, const LabelChoice& choice) {
   const std::string extension = lower_extension(path);
   if (extension != ".nrrd" && extension != ".nhdr") {
-    if (choice.segment.empty()) return read_nifti(path);
+    if (choice.segment.empty()) {
+      const bool freesurfer = extension == ".mgz" || extension == ".mgh";
+      return freesurfer ? read_mgh(path) : read_nifti(path);
+    }
     return invalid_file(path, "names no segments: only a .seg.nrrd file does");
   }
   return parse_file(path, [&](const std::string& content) { return parse_nrrd(content, choice); });

@@ -277,6 +277,9 @@ TEST(CaseFile, BadFilesAreRefusedInOneLineThatNamesFileLineKeyAndValue) {
        {"label: 7", "segment: ''", ":12: tumour.label_volume.segment: must not be empty"},
        {"skull_file: skull.stl", "skull_file: ''", ":26: contact.skull_file: must name a file"},
        {"case_id: full\n", "", ": case_id: key is missing"},
+       {"centre_mm: [7, 8, 9]\n  long_axis_mm: 30\n  short_axis_mm: 20\n"
+        "  long_axis_direction: [0, 3, 4]\nbrainstem: {centre_mm: [0, 1, -60], radius_mm: 9}",
+        "long_axis_mm: 30", ": craniotomy.centre_mm, brainstem: keys are missing"},
        {"case_id: full", "case_id: ''", ":1: case_id: must not be empty"},
        {"  centre_mm: [7, 8, 9]\n", "", ":13: craniotomy.centre_mm: key is missing"},
        {"brainstem: {centre_mm: [0, 1, -60], radius_mm: 9}\n", "", ": brainstem: key is missing"},

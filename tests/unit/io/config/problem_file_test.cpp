@@ -64,7 +64,7 @@ TEST(ProblemFile, BadFilesAreRefusedWithFileLineAndKey) {
   };
   test_support::expect_refused(
       read,
-      {{"", "/data/p.yaml: materials: key is missing"},
+      {{"", "/data/p.yaml: materials, regions: keys are missing"},
        {kMaterials + "gravity: 1\n", "/data/p.yaml:4: gravity: unknown key"},
        {kMaterials + "groups: {a: {cone: {}}}\n",
         "/data/p.yaml:4: groups.a has none: must have exactly one of plane"},

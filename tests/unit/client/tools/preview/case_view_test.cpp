@@ -23,10 +23,10 @@ class CaseViewOf : public testing::Test {
   TemporaryFolder folder;
 };
 
-TEST_F(CaseViewOf, ASoundCaseHasRolesAndNeitherProblemsNorDoubts) {
+TEST_F(CaseViewOf, ASoundCaseHasRolesAndNeitherProblemsNorDoubtsButItsSize) {
   const CaseView seen = view();
   EXPECT_THAT(seen.problems, IsEmpty());
-  EXPECT_THAT(doubts(seen), IsEmpty());
+  EXPECT_THAT(doubts(seen), ElementsAre(HasSubstr("the brain has 3375 cc; an adult's has 900 to")));
   ASSERT_EQ(seen.roles.size(), static_cast<std::size_t>(seen.brain.num_vertices()));
   for (const NodeRole role :
        {NodeRole::kFixed, NodeRole::kSlave, NodeRole::kCraniotomy, NodeRole::kBrainstem})
@@ -87,7 +87,44 @@ TEST_F(CaseViewOf, AnOpeningInTheAirIsAProblemWithoutRoles) {
   EXPECT_THAT(seen.problems, ElementsAre(HasSubstr("craniotomy.centre_mm")));
   EXPECT_THAT(seen.roles, IsEmpty());
   EXPECT_FALSE(opening_of(seen));
-  EXPECT_THAT(doubts(seen), IsEmpty());
+  EXPECT_THAT(doubts(seen), Contains(AllOf(HasSubstr("craniotomy.centre_mm = [175, -10, 20]"),
+                                           HasSubstr("100 mm from the brain's surface"))));
+}
+
+TEST_F(CaseViewOf, DoubtsSayHowFarACentreIsProjectedAndKnowCentimetres) {
+  const auto lines = doubts(view({.craniotomy = "[7.5, -1, 2]"}));
+  EXPECT_THAT(lines, Contains(AllOf(HasSubstr("[7.5, -1, 2]"), HasSubstr("centimetres?"))));
+  EXPECT_THAT(
+      doubts(view({.craniotomy = "[60, -10, 20]"})),
+      Contains(AllOf(HasSubstr("mm from the brain's surface"), Not(HasSubstr("centimetres?")))));
+}
+
+// An MRI that is bright in the box, grey around it and black far away.
+VoxelImage head_with_a_brain(const Vec3& centre) {
+  VoxelImage mri;
+  mri.dims = {101, 101, 101};
+  mri.T_ras_voxel.linear() *= 2.0;
+  mri.T_ras_voxel.translation() = Vec3(-100, -100, -100);
+  for (int k = 0; k < 101; ++k) {
+    for (int j = 0; j < 101; ++j) {
+      for (int i = 0; i < 101; ++i) {
+        const double away = (mri.T_ras_voxel * Vec3(i, j, k) - centre).cwiseAbs().maxCoeff();
+        mri.values.push_back(away < 75.0 ? 100.0F : away < 90.0 ? 40.0F : 0.0F);
+      }
+    }
+  }
+  return mri;
+}
+
+TEST_F(CaseViewOf, DoubtsNameABrainBesideTheOneInTheMri) {
+  CaseView seen = view();
+  EXPECT_FALSE(fit_of_mri(seen));
+  seen.config.mri = "t1.nii";
+  seen.background = head_with_a_brain(Vec3::Zero());
+  EXPECT_GT(fit_of_mri(seen)->contrast, 0.5);
+  EXPECT_THAT(doubts(seen), Not(Contains(HasSubstr("images.mri"))));
+  seen.background = head_with_a_brain(Vec3(0, 30, 0));
+  EXPECT_THAT(doubts(seen), Contains(HasSubstr("does not lie on the brain in images.mri")));
 }
 
 TEST_F(CaseViewOf, AMissingFileIsAnError) {

@@ -1,0 +1,472 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "client/tools/init/init.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <limits>
+#include <map>
+#include <numbers>
+#include <optional>
+#include <set>
+#include <utility>
+
+#include "client/tools/init/position.hpp"
+#include "common/anatomy/brain_labels.hpp"
+#include "common/anatomy/given_inputs.hpp"
+#include "common/core/text.hpp"
+#include "common/geometry/mask.hpp"
+#include "common/io/config/config_file.hpp"
+#include "common/io/dicom/dicom_segmentation.hpp"
+#include "common/io/dicom/dicom_series.hpp"
+#include "common/io/fields/field_files.hpp"
+#include "common/io/files/csv_numbers.hpp"
+#include "common/io/files/file_access.hpp"
+#include "common/io/files/output_path.hpp"
+#include "common/io/geometry/label_map_file.hpp"
+#include "common/io/geometry/label_names.hpp"
+
+namespace brainshift::client {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr double kMm3PerCc = 1000.0;
+constexpr double kLowest_mm = 8.0;
+constexpr double kStemHalfWidth_mm = 15.0;
+constexpr double kStemRadius_mm = 14.0;
+constexpr double kDown = -0.3;  // sine of the elevation
+constexpr double kCap_mm = 3.0;
+// An opening is wider than the tumour's ball.
+constexpr double kOpeningMargin_mm = 20.0, kSmallOpening_mm = 40.0, kLargeOpening_mm = 80.0;
+
+// Calls take(place, value) for every voxel > 0.
+template <typename Take>
+void for_each_voxel(const VoxelImage& mask, const Take& take) {
+  std::size_t v = 0;
+  for (int k = 0; k < mask.dims[2]; ++k) {
+    for (int j = 0; j < mask.dims[1]; ++j) {
+      for (int i = 0; i < mask.dims[0]; ++i, ++v) {
+        if (mask.values[v] > 0.0F) take(Vec3(mask.T_ras_voxel * Vec3(i, j, k)));
+      }
+    }
+  }
+}
+
+struct Centre {
+  Vec3 at = Vec3::Zero();
+  double cc = 0.0;
+};
+Centre centre_of_mask(const VoxelImage& mask) {
+  Centre centre;
+  std::size_t count = 0;
+  for_each_voxel(mask, [&](const Vec3& x) { centre.at += x, ++count; });
+  centre.at /= static_cast<double>(std::max<std::size_t>(count, 1));
+  centre.cc =
+      static_cast<double>(count) * std::abs(mask.T_ras_voxel.linear().determinant()) / kMm3PerCc;
+  return centre;
+}
+
+Status check_options(const InitOptions& options) {
+  std::string missing;
+  const auto need = [&](bool given, const char* what) {
+    if (!given) missing += (missing.empty() ? "" : ", ") + std::string(what);
+  };
+  need(!options.mri.empty(), "--mri");
+  need(!options.brain.empty() || !options.labels.empty(), "--brain or --labels");
+  need(!options.tumour.empty(), "--tumour");
+  need(!options.position.empty(), "--position");
+  need(!options.out.empty(), "--out");
+  if (!missing.empty()) return invalid("missing: " + missing);
+  if (fs::exists(options.out)) {
+    return invalid("--out: " + options.out.string() + ": exists; a case is never replaced");
+  }
+  return io::check_output_file("--out", options.out);
+}
+
+// ---- the tumour's labels ----
+
+std::set<int> labels_in(const VoxelImage& image) {
+  std::set<int> labels;
+  for (const float v : image.values) {
+    if (std::isfinite(v) && v != 0.0F) labels.insert(static_cast<int>(std::lround(v)));
+  }
+  return labels;
+}
+
+struct TumourChoice {
+  std::vector<int> labels = {1};
+  std::string why;
+};
+
+Result<TumourChoice> named_labels(const InitOptions& options, const io::LabelNames& names) {
+  TumourChoice choice{{}, "--tumour-label"};
+  for (const std::string_view word : io::cells_of(options.tumour_label)) {
+    double number = 0.0;
+    const bool whole =
+        io::parse_number(word, number) && number == std::round(number) && std::abs(number) < 1e9;
+    auto found = std::find_if(names.begin(), names.end(), [&](const auto& name) {
+      return io::lower_case(name.second) == io::lower_case(word);
+    });
+    if (!whole && found == names.end()) {
+      std::string known;
+      for (const auto& [label, name] : names) {
+        known += (known.empty() ? "" : ", ") + in_quotes(name);
+      }
+      return invalid(fmt::format("--tumour-label: {}: must be a whole number, or a name of {} ({})",
+                                 in_quotes(word), options.tumour.string(),
+                                 known.empty() ? "there is none" : known));
+    }
+    choice.labels.push_back(whole ? static_cast<int>(number) : found->first);
+  }
+  return choice;
+}
+
+Result<TumourChoice> tumour_labels(const InitOptions& options, const VoxelImage& image) {
+  if (!options.tumour_label.empty()) {
+    const auto names = io::label_names_beside(options.tumour);
+    if (!names) return tl::unexpected(names.error());
+    return named_labels(options, *names);
+  }
+  const std::set<int> there = labels_in(image);
+  if (there.size() <= 1) {
+    return TumourChoice{{there.empty() ? 1 : *there.begin()}, "the only label"};
+  }
+  const bool brats = *there.begin() >= 1 && *there.rbegin() <= 4 && there.count(2) != 0 &&
+                     there.count(3) + there.count(4) != 0;
+  if (brats) {
+    TumourChoice choice{{}, "labels as of BraTS: all but 2, oedema"};
+    std::copy_if(there.begin(), there.end(), std::back_inserter(choice.labels),
+                 [](int label) { return label != 2; });
+    return choice;
+  }
+  // Not whole: a soft mask, which anatomy::tumour_foci judges.
+  const bool whole = std::all_of(image.values.begin(), image.values.end(),
+                                 [](float v) { return v == std::round(v); });
+  if (!whole) return TumourChoice{{1}, "a soft mask"};
+  return invalid(fmt::format("{}: has several labels; name the tumour's by --tumour-label: {}",
+                             options.tumour.string(), anatomy::listed_labels(image)));
+}
+
+// Of a DICOM segmentation: the only segment, or those that were named.
+Result<TumourChoice> tumour_segments(const InitOptions& options, const io::DicomSegmentation& seg) {
+  if (options.tumour_label.empty() && seg.names.size() == 1) {
+    return TumourChoice{{seg.names.begin()->first}, "the only segment"};
+  }
+  std::string list;
+  for (const auto& [number, name] : seg.names) {
+    list += fmt::format("{}{} {}", list.empty() ? "" : ", ", number, in_quotes(name));
+  }
+  if (options.tumour_label.empty()) {
+    return invalid(fmt::format("{}: has several segments; name the tumour's by --tumour-label: {}",
+                               options.tumour.string(), list));
+  }
+  auto choice = named_labels(options, seg.names);
+  for (const int number : choice ? choice->labels : std::vector<int>()) {
+    if (seg.names.count(number) != 0) continue;
+    return invalid(fmt::format("--tumour-label: {}: {} has no such segment; it has {}", number,
+                               options.tumour.string(), list));
+  }
+  return choice;
+}
+
+// ---- the case as text ----
+
+std::string list_text(const Vec3& x, int digits) {
+  return fmt::format("[{:.{}f}, {:.{}f}, {:.{}f}]", x[0], digits, x[1], digits, x[2], digits);
+}
+
+// In double quotes, as YAML has them.
+std::string file_text(const fs::path& path) {
+  std::string text = "\"";
+  for (const char c : fs::absolute(path).lexically_normal().string()) {
+    if (c == '"' || c == '\\') text += '\\';
+    text += c;
+  }
+  return text + "\"";
+}
+
+// Lines of comment, broken before column 100.
+std::string comment(const std::string& sentence, std::size_t indent) {
+  const std::string begin = std::string(indent, ' ') + "#";
+  std::string text, line = begin;
+  for (std::size_t at = 0; at < sentence.size();) {
+    const std::size_t end = std::min(sentence.find(' ', at), sentence.size());
+    if (line.size() > begin.size() && line.size() + 1 + end - at > 99) {
+      text += line + "\n";
+      line = begin;
+    }
+    line += " " + sentence.substr(at, end - at);
+    at = end + 1;
+  }
+  return text + line + "\n";
+}
+
+struct Draft {
+  InitOptions options;
+  fs::path mri, brain, tumour_file;
+  TumourChoice tumour;
+  std::optional<VoxelImage> segments;  // of a DICOM segmentation
+  std::string about_mri, about_brain, about_tumour, about_opening, about_stem, about_gravity;
+  double opening_mm = 0.0;
+  OpeningGuess opening;
+  Vec3 stem = Vec3::Zero(), gravity = Vec3::Zero();
+};
+
+std::string case_text(const Draft& draft) {
+  const bool segment = !draft.options.tumour_segment.empty();
+  std::string labels;
+  for (const int label : draft.tumour.labels) {
+    labels += fmt::format("{}{}", labels.empty() ? "" : ", ", label);
+  }
+  const Vec3 axis = std::abs(draft.opening.outward.y()) > 0.8 ? Vec3::UnitZ() : Vec3::UnitY();
+  std::string text = comment(
+      "A first case by brainshift init. What is marked GUESS is one: look at the pictures of "
+      "brainshift preview and correct it. Places are patient RAS in mm: +x right, +y anterior, "
+      "+z superior. config/cases/colin27.yaml documents every key.",
+      0);
+  text += "case_id: " + draft.options.out.stem().string() + "\n\nimages:\n";
+  if (!draft.about_mri.empty()) text += comment(draft.about_mri, 2);
+  text += "  mri: " + file_text(draft.mri) + "\n" + comment(draft.about_brain, 2);
+  text += "  brain: " + file_text(draft.brain) + "\n\ntumour:\n  label_volume:\n";
+  text += comment(draft.about_tumour, 4) + "    file: " + file_text(draft.tumour_file) + "\n";
+  text += segment ? "    segment: \"" + draft.options.tumour_segment + "\"\n"
+                  : "    label: [" + labels + "]\n";
+  text += "\ncraniotomy:\n" + comment(draft.about_opening, 2);
+  text += "  centre_mm: " + list_text(draft.opening.centre, 1) + "\n";
+  text += fmt::format("  long_axis_mm: {:.0f}\n  short_axis_mm: {:.0f}\n", draft.opening_mm,
+                      draft.opening_mm);
+  text += "  long_axis_direction: " + list_text(axis, 0) + "\n";
+  text += "\nbrainstem:\n" + comment(draft.about_stem, 2);
+  text += "  centre_mm: " + list_text(draft.stem, 1) + "\n";
+  text += fmt::format("  radius_mm: {:.0f}\n", kStemRadius_mm);
+  text += "\ngravity:\n" + comment(draft.about_gravity, 2);
+  return text + "  direction: " + list_text(draft.gravity, 4) + "\n";
+}
+
+// ---- what is guessed ----
+
+fs::path beside(const fs::path& out, const std::string& what) {
+  return out.parent_path() / (out.stem().string() + what);
+}
+
+Result<VoxelImage> read_labels(const fs::path& path) {
+  auto map = io::read_volume(path);
+  if (!map) return map;
+  const auto names = io::label_names_beside(path);
+  if (!names) return tl::unexpected(names.error());
+  if (names->empty()) return map;
+  auto renamed = anatomy::with_freesurfer_numbers(*map, *names);
+  if (!renamed) return io::file_error(path, renamed.error());
+  return renamed;
+}
+
+std::optional<Vec3> stem_from_labels(VoxelImage labels) {
+  bool found = false;
+  for (float& v : labels.values) {
+    const bool stem = std::isfinite(v) && anatomy::structure_of(static_cast<int>(std::lround(v))) ==
+                                              anatomy::Structure::kBrainstem;
+    v = stem ? 1.0F : 0.0F;
+    found = found || stem;
+  }
+  if (!found) return std::nullopt;
+  return lowest_part(labels, std::numeric_limits<double>::infinity());
+}
+
+std::string about_series(const io::DicomSeries& series) {
+  std::string text = fmt::format("From the DICOM series {}, {} images",
+                                 in_quotes(series.description), series.image.dims[2]);
+  if (series.other_files > 0) {
+    text += fmt::format("; {} files of the folder are no images", series.other_files);
+  }
+  if (!series.patient_position.empty()) {
+    text += fmt::format("; scanned {}, which need not be the position in surgery",
+                        one_line(series.patient_position));
+  }
+  return text + ".";
+}
+
+Status guess_tumour(Draft& draft, const VoxelImage& brain) {
+  const InitOptions& options = draft.options;
+  Result<VoxelImage> image = VoxelImage();
+  Result<TumourChoice> choice = TumourChoice();
+  if (io::is_dicom(options.tumour)) {
+    const auto seg = io::read_dicom_segmentation(options.tumour);
+    if (!seg) return tl::unexpected(seg.error());
+    choice = tumour_segments(options, *seg);
+    if (choice) image = io::label_map(*seg, choice->labels), draft.segments = *image;
+    draft.tumour_file = beside(options.out, "-tumour.nii.gz");
+  } else {
+    image = io::read_label_map(options.tumour, {options.tumour_segment, 1});
+    if (image) choice = tumour_labels(options, *image);
+  }
+  if (!image) return tl::unexpected(image.error());
+  if (!choice) return tl::unexpected(choice.error());
+  draft.tumour = *choice;
+  anatomy::Notes notes;
+  const auto foci =
+      anatomy::tumour_foci(*image, choice->labels, 0.0, options.tumour.string(), &notes);
+  if (!foci) return tl::unexpected(foci.error());
+  double mm3 = 0.0;
+  for (const anatomy::Focus& focus : *foci) mm3 += focus.volume_mm3;
+  draft.about_tumour = fmt::format("{:.2f} cc ({}).", mm3 / kMm3PerCc,
+                                   options.tumour_segment.empty() ? choice->why : "the segment");
+  for (const std::string& note : notes) {
+    draft.about_tumour += " " + note.substr(options.tumour.string().size() + 2) + ".";
+  }
+  const Vec3 centre = foci->front().centre;
+  const double ball_mm = 2.0 * std::cbrt(0.75 * foci->front().volume_mm3 / std::numbers::pi);
+  draft.opening = opening_over(brain, centre);
+  draft.opening_mm =
+      std::round(std::clamp(ball_mm + kOpeningMargin_mm, kSmallOpening_mm, kLargeOpening_mm));
+  draft.about_opening = fmt::format(
+      "GUESS: the outermost place of the brain that is nearest to the tumour's centre, {} mm, from "
+      "which it is {:.0f} mm away; as wide as a ball of the tumour's volume and {:.0f} mm more, at "
+      "least {:.0f} mm.",
+      list_text(centre, 0), (draft.opening.centre - centre).norm(), kOpeningMargin_mm,
+      kSmallOpening_mm);
+  return {};
+}
+
+}  // namespace
+
+Vec3 lowest_part(const VoxelImage& mask, double half_width_mm) {
+  const double middle = centre_of_mask(mask).at.x();
+  const auto counts = [&](const Vec3& x) { return std::abs(x.x() - middle) <= half_width_mm; };
+  double lowest = std::numeric_limits<double>::infinity();
+  for_each_voxel(mask,
+                 [&](const Vec3& x) { lowest = counts(x) ? std::min(lowest, x.z()) : lowest; });
+  Vec3 sum = Vec3::Zero();
+  double count = 0.0;
+  for_each_voxel(mask, [&](const Vec3& x) {
+    if (counts(x) && x.z() <= lowest + kLowest_mm) sum += x, count += 1.0;
+  });
+  return sum / count;
+}
+
+OpeningGuess opening_over(const VoxelImage& mask, const Vec3& tumour) {
+  const Vec3 middle = centre_of_mask(mask).at;
+  // The farthest place in each cell of 5 by 5 degrees.
+  constexpr double kCells = 72.0 / (2.0 * std::numbers::pi);
+  std::map<std::pair<int, int>, Vec3> farthest;
+  for_each_voxel(mask, [&](const Vec3& x) {
+    const Vec3 d = x - middle;
+    const double height = std::asin(std::clamp(d.z() / std::max(d.norm(), 1e-9), -1.0, 1.0));
+    const auto cell = std::pair(static_cast<int>(std::floor(kCells * std::atan2(d.y(), d.x()))),
+                                static_cast<int>(std::floor(kCells * height)));
+    const auto [place, is_new] = farthest.try_emplace(cell, x);
+    if (!is_new && d.norm() > (place->second - middle).norm()) place->second = x;
+  });
+  OpeningGuess guess{middle, Vec3::UnitZ()};
+  double nearest = std::numeric_limits<double>::infinity();
+  for (const auto& [towards, end] : farthest) {
+    const Vec3 outward = (end - middle).normalized();
+    if (outward.z() < kDown) continue;
+    double top = -std::numeric_limits<double>::infinity();
+    for (const auto& [cell, x] : farthest) top = std::max(top, outward.dot(x));
+    for (const auto& [cell, x] : farthest) {
+      if (outward.dot(x) < top - kCap_mm || (x - tumour).norm() >= nearest) continue;
+      nearest = (x - tumour).norm();
+      guess = {x, outward};
+    }
+  }
+  return guess;
+}
+
+Result<InitSummary> write_first_case(const InitOptions& options) {
+  if (Status ok = check_options(options); !ok) return tl::unexpected(ok.error());
+  Draft draft;
+  draft.options = options;
+  draft.mri = options.mri, draft.brain = options.brain, draft.tumour_file = options.tumour;
+  const auto gravity = gravity_of_position(options.position);
+  if (!gravity) return tl::unexpected(gravity.error());
+  draft.gravity = *gravity;
+  draft.about_gravity =
+      fmt::format("From --position {}: where things fall, seen from the head.", options.position);
+  InitSummary summary;
+  std::optional<VoxelImage> series;
+  if (fs::is_directory(options.mri)) {
+    auto read = io::read_dicom_series(options.mri);
+    if (!read) return tl::unexpected(read.error());
+    draft.mri = beside(options.out, "-mri.nii.gz");
+    draft.about_mri = about_series(*read);
+    series = std::move(read->image);
+  } else if (io::lower_extension(options.mri) == ".dcm") {
+    return invalid("--mri: " + options.mri.string() +
+                   ": is one image of a DICOM series: give the folder that holds the series");
+  } else if (const auto mri = io::read_volume(options.mri); !mri) {
+    return tl::unexpected(mri.error());
+  }
+
+  std::optional<VoxelImage> labels;
+  if (!options.labels.empty()) {
+    auto map = read_labels(options.labels);
+    if (!map) return tl::unexpected(map.error());
+    labels = std::move(*map);
+  }
+  VoxelImage brain;
+  if (!options.brain.empty()) {
+    const auto given = io::read_volume(options.brain);
+    if (!given) return tl::unexpected(given.error());
+    anatomy::Notes notes;
+    auto mask = anatomy::brain_mask(*given, options.brain.string(), &notes);
+    if (!mask) return tl::unexpected(mask.error());
+    brain = std::move(*mask);
+    draft.about_brain = fmt::format("Given; {:.0f} cc.", centre_of_mask(brain).cc);
+    for (const std::string& note : notes) {
+      draft.about_brain += " " + note.substr(options.brain.string().size() + 2) + ".";
+    }
+  } else {
+    auto mask = anatomy::brain_from_labels(*labels);
+    if (!mask) return io::file_error(options.labels, mask.error());
+    brain = std::move(*mask);
+    draft.brain = beside(options.out, "-brain.nii.gz");
+    draft.about_brain = fmt::format(
+        "GUESS: cerebrum, cerebellum, brainstem and ventricles of {}, with sulci closed; "
+        "{:.0f} cc.",
+        options.labels.filename().string(), centre_of_mask(brain).cc);
+  }
+  if (Status ok = guess_tumour(draft, brain); !ok) return tl::unexpected(ok.error());
+  const auto stem = labels ? stem_from_labels(*labels) : std::nullopt;
+  draft.stem = stem ? *stem : lowest_part(brain, kStemHalfWidth_mm);
+  draft.about_stem =
+      stem ? fmt::format("GUESS: the lowest {:g} mm of the brainstem in {}.", kLowest_mm,
+                         options.labels.filename().string())
+           : fmt::format(
+                 "GUESS: the lowest {:g} mm of the brain within {:g} mm of its middle; "
+                 "tonsils of the cerebellum may lie there: move it to where the medulla "
+                 "leaves the skull.",
+                 kLowest_mm, kStemHalfWidth_mm);
+
+  const std::string text = case_text(draft);
+  if (const auto read = io::parse_case_config(text, options.out); !read) {
+    return tl::unexpected(read.error());
+  }
+  const auto write = [&](const fs::path& path, const VoxelImage& image, const char* note) {
+    summary.files.push_back(path);
+    return io::write_nifti(path, {{image.dims, image.T_ras_voxel}, image.values, note});
+  };
+  if (series) {
+    if (Status ok = write(draft.mri, *series, "from DICOM"); !ok) return tl::unexpected(ok.error());
+  }
+  if (draft.segments) {
+    const Status ok = write(draft.tumour_file, *draft.segments, "from DICOM SEG");
+    if (!ok) return tl::unexpected(ok.error());
+  }
+  if (options.brain.empty()) {
+    if (Status ok = write(draft.brain, brain, "brain mask"); !ok) return tl::unexpected(ok.error());
+  }
+  if (Status ok = io::write_file(options.out, text); !ok) return tl::unexpected(ok.error());
+  summary.files.push_back(options.out);
+  if (series) summary.guesses.push_back("MRI: " + draft.about_mri);
+  for (std::string line : {"brain: " + draft.about_brain, "tumour: " + draft.about_tumour,
+                           "craniotomy: " + draft.about_opening, "brainstem: " + draft.about_stem,
+                           "gravity: " + draft.about_gravity}) {
+    summary.guesses.push_back(std::move(line));
+  }
+  return summary;
+}
+
+}  // namespace brainshift::client

@@ -1,0 +1,251 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "common/io/dicom/dicom_series.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstdint>
+#include <map>
+#include <memory>
+#include <vector>
+
+#include "common/core/text.hpp"
+#include "common/io/dicom/dicom_access.hpp"
+#include "common/io/dicom/dicom_segmentation.hpp"
+#include "common/io/files/file_access.hpp"
+
+namespace brainshift::io {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr double kSameDirection = 1e-4, kSameSpacing = 1e-4;
+constexpr int kMaxDicomVoxelsAlong = 32767;
+
+struct Slice {
+  fs::path file;
+  std::string series, description, patient_position;
+  std::array<int, 2> size{};  // columns, rows
+  ImagePlane plane;
+  std::vector<float> values;
+};
+
+template <typename Stored>
+void take_values(const Stored* stored, std::size_t count, int bits, bool is_signed, double slope,
+                 double intercept, std::vector<float>& values) {
+  const auto mask = bits >= 32 ? ~std::uint32_t{0} : (std::uint32_t{1} << bits) - 1;
+  const auto sign = std::uint32_t{1} << (bits - 1);
+  values.reserve(count);
+  for (std::size_t v = 0; v < count; ++v) {
+    const std::uint32_t raw = static_cast<std::uint32_t>(stored[v]) & mask;
+    const auto value = is_signed && (raw & sign) != 0
+                           ? static_cast<double>(raw) - static_cast<double>(mask) - 1.0
+                           : static_cast<double>(raw);
+    values.push_back(static_cast<float>(slope * value + intercept));
+  }
+}
+
+Status take_pixels(DcmDataset& data, Slice& slice) {
+  Uint16 columns = 0, rows = 0, samples = 1, allocated = 0, stored = 0, is_signed = 0;
+  data.findAndGetUint16(DCM_Columns, columns);
+  data.findAndGetUint16(DCM_Rows, rows);
+  data.findAndGetUint16(DCM_SamplesPerPixel, samples);
+  data.findAndGetUint16(DCM_BitsAllocated, allocated);
+  data.findAndGetUint16(DCM_BitsStored, stored);
+  data.findAndGetUint16(DCM_PixelRepresentation, is_signed);
+  if (columns < 1 || rows < 1 || std::max(columns, rows) > kMaxDicomVoxelsAlong) {
+    return wrong_tag("Rows, Columns (0028,0010-11)", fmt::format("{} and {}: must be 1 to {}", rows,
+                                                                 columns, kMaxDicomVoxelsAlong));
+  }
+  if (samples != 1)
+    return wrong_tag("SamplesPerPixel (0028,0002)", fmt::format("{}: is a colour image", samples));
+  if ((allocated != 8 && allocated != 16) || stored < 1 || stored > allocated) {
+    return wrong_tag(
+        "BitsAllocated, BitsStored (0028,0100-01)",
+        fmt::format("{} and {}: must be 8 or 16, and at most that", allocated, stored));
+  }
+  slice.size = {columns, rows};
+  std::array<double, 1> slope{1.0}, intercept{0.0};
+  if (data.tagExists(DCM_RescaleSlope) && !take_numbers(data, DCM_RescaleSlope, slope)) {
+    return wrong_tag("RescaleSlope (0028,1053)", "must be a number");
+  }
+  if (data.tagExists(DCM_RescaleIntercept) &&
+      !take_numbers(data, DCM_RescaleIntercept, intercept)) {
+    return wrong_tag("RescaleIntercept (0028,1052)", "must be a number");
+  }
+  if (Status ok = expand_pixels(data); !ok) return ok;
+  const auto count = static_cast<std::size_t>(columns) * rows;
+  unsigned long there = 0;
+  const Uint8* bytes = nullptr;
+  const Uint16* words = nullptr;
+  if (allocated == 8) {
+    data.findAndGetUint8Array(DCM_PixelData, bytes, &there);
+  } else {
+    data.findAndGetUint16Array(DCM_PixelData, words, &there);
+  }
+  if ((bytes == nullptr && words == nullptr) || there < count) {
+    return wrong_tag("PixelData (7fe0,0010)",
+                     fmt::format("has {} pixels: must be {} x {}", there, columns, rows));
+  }
+  if (bytes != nullptr) {
+    take_values(bytes, count, stored, is_signed != 0, slope[0], intercept[0], slice.values);
+  } else {
+    take_values(words, count, stored, is_signed != 0, slope[0], intercept[0], slice.values);
+  }
+  return {};
+}
+
+// An image; nothing for DICOM without one.
+Result<std::unique_ptr<Slice>> read_slice(const fs::path& file) {
+  DcmFileFormat format;
+  const OFCondition read = format.loadFile(file.c_str());
+  if (read.bad()) return unreadable(std::string("is damaged: ") + read.text());
+  DcmDataset& data = *format.getDataset();
+  if (!data.tagExists(DCM_PixelData)) return nullptr;
+  Sint32 frames = 1;
+  if (data.tagExists(DCM_NumberOfFrames)) data.findAndGetSint32(DCM_NumberOfFrames, frames);
+  if (frames != 1) {
+    return wrong_tag(
+        "NumberOfFrames (0028,0008)",
+        fmt::format("{}: enhanced images are not read; dcm2niix makes NIfTI of them", frames));
+  }
+  auto slice = std::make_unique<Slice>();
+  slice->file = file;
+  slice->series = text_of(data, DCM_SeriesInstanceUID);
+  slice->description = to_utf8(text_of(data, DCM_SeriesDescription));
+  slice->patient_position = text_of(data, DCM_PatientPosition);
+  const auto plane = image_plane(data, data, data);
+  if (!plane) return tl::unexpected(plane.error());
+  slice->plane = *plane;
+  if (Status ok = take_pixels(data, *slice); !ok) return tl::unexpected(ok.error());
+  return slice;
+}
+
+Status check_one_series(const std::vector<Slice>& slices) {
+  std::map<std::string, std::pair<std::string, int>> series;
+  for (const Slice& slice : slices) {
+    auto& [description, count] = series[slice.series];
+    description = slice.description;
+    ++count;
+  }
+  if (series.size() > 1) {
+    std::string list;
+    for (const auto& [uid, told] : series) {
+      list += fmt::format("{}{} of {} images", list.empty() ? "" : ", ", in_quotes(told.first),
+                          told.second);
+    }
+    return unreadable("holds several series: " + list + "; give a folder that holds one");
+  }
+  const Slice& first = slices.front();
+  for (const Slice& slice : slices) {
+    const bool directions =
+        (slice.plane.along_row - first.plane.along_row).norm() < kSameDirection &&
+        (slice.plane.along_column - first.plane.along_column).norm() < kSameDirection;
+    const bool spacings =
+        std::abs(slice.plane.between_rows - first.plane.between_rows) < kSameSpacing &&
+        std::abs(slice.plane.between_columns - first.plane.between_columns) < kSameSpacing;
+    if (directions && spacings && slice.size == first.size) continue;
+    return unreadable(fmt::format("{} and {} differ in {}: not slices of one volume",
+                                  first.file.filename().string(), slice.file.filename().string(),
+                                  !directions ? "direction"
+                                  : !spacings ? "pixel spacing"
+                                              : "size"));
+  }
+  return {};
+}
+
+// The step from slice to slice, LPS. Precondition: sorted along the normal.
+Result<Vec3> slice_step(const std::vector<Slice>& slices) {
+  const auto name = [&](std::size_t i) { return slices[i].file.filename().string(); };
+  if (slices.size() < 2) return unreadable("holds one image: must be a volume of several");
+  const Vec3 step = (slices.back().plane.position - slices.front().plane.position) /
+                    static_cast<double>(slices.size() - 1);
+  for (std::size_t i = 1; i < slices.size(); ++i) {
+    const double apart = (slices[i].plane.position - slices[i - 1].plane.position).norm();
+    if (apart < kLargestSliceError_mm) {
+      return unreadable(fmt::format("{} and {} lie at one place: several images of each slice",
+                                    name(i - 1), name(i)));
+    }
+  }
+  for (std::size_t i = 1; i < slices.size(); ++i) {
+    const Vec3 even = slices.front().plane.position + static_cast<double>(i) * step;
+    if ((slices[i].plane.position - even).norm() <= kLargestSliceError_mm) continue;
+    std::size_t widest = 1;
+    double gap = 0.0;
+    for (std::size_t k = 1; k < slices.size(); ++k) {
+      const double wide = (slices[k].plane.position - slices[k - 1].plane.position).norm();
+      if (wide > gap) gap = wide, widest = k;
+    }
+    return unreadable(fmt::format(
+        "its {} images are not evenly spaced: {} and {} lie {:.3f} mm apart, the mean is "
+        "{:.3f} mm; is a file missing?",
+        slices.size(), name(widest - 1), name(widest), gap, step.norm()));
+  }
+  return step;
+}
+
+Result<DicomSeries> join(std::vector<Slice>& slices) {
+  if (Status ok = check_one_series(slices); !ok) return tl::unexpected(ok.error());
+  const Vec3 normal = slices.front().plane.along_row.cross(slices.front().plane.along_column);
+  std::sort(slices.begin(), slices.end(), [&](const Slice& a, const Slice& b) {
+    return a.plane.position.dot(normal) < b.plane.position.dot(normal);
+  });
+  const auto step = slice_step(slices);
+  if (!step) return tl::unexpected(step.error());
+  const Slice& first = slices.front();
+  DicomSeries series;
+  series.description = first.description;
+  series.patient_position = first.patient_position;
+  VoxelImage& image = series.image;
+  image.dims = {first.size[0], first.size[1], static_cast<int>(slices.size())};
+  const Vec3 to_ras(-1.0, -1.0, 1.0);
+  image.T_ras_voxel.linear().col(0) =
+      to_ras.cwiseProduct(first.plane.between_columns * first.plane.along_row);
+  image.T_ras_voxel.linear().col(1) =
+      to_ras.cwiseProduct(first.plane.between_rows * first.plane.along_column);
+  image.T_ras_voxel.linear().col(2) = to_ras.cwiseProduct(*step);
+  image.T_ras_voxel.translation() = to_ras.cwiseProduct(first.plane.position);
+  image.values.reserve(image.num_voxels());
+  for (const Slice& slice : slices) {
+    image.values.insert(image.values.end(), slice.values.begin(), slice.values.end());
+  }
+  return series;
+}
+
+}  // namespace
+
+Result<DicomSeries> read_dicom_series(const fs::path& folder) {
+  if (!fs::is_directory(folder)) return file_error(ErrorCode::kNotFound, folder, "is no folder");
+  prepare_dcmtk();
+  std::vector<fs::path> files;
+  for (const auto& entry : fs::directory_iterator(folder)) {
+    if (entry.is_regular_file()) files.push_back(entry.path());
+  }
+  std::sort(files.begin(), files.end());
+  std::vector<Slice> slices;
+  int others = 0;
+  for (const fs::path& file : files) {
+    if (!is_dicom(file)) {
+      ++others;
+      continue;
+    }
+    auto slice = read_slice(file);
+    if (!slice) return file_error(file, slice.error());
+    if (*slice) {
+      slices.push_back(std::move(**slice));
+    } else {
+      ++others;
+    }
+  }
+  if (slices.empty()) {
+    return unreadable(folder, fmt::format("holds no DICOM image ({} files)", files.size()));
+  }
+  auto series = join(slices);
+  if (!series) return file_error(folder, series.error());
+  series->other_files = others;
+  return series;
+}
+
+}  // namespace brainshift::io

@@ -1,0 +1,178 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "client/tools/init/init.hpp"
+
+#include <gmock/gmock.h>
+
+#include <cstdlib>
+
+#include "client/tools/preview/case_view.hpp"
+#include "common/io/config/config_file.hpp"
+#include "common/io/fields/field_files.hpp"
+#include "common/io/geometry/label_map_file.hpp"
+#include "tests/support/results.hpp"
+#include "tests/support/temporary_folder.hpp"
+#include "tests/unit/io/dicom/dicom_bytes.hpp"
+
+namespace brainshift::client {
+namespace {
+
+using test_support::TemporaryFolder;
+using testing::AllOf;
+using testing::ElementsAre;
+using testing::HasSubstr;
+using testing::IsEmpty;
+
+// Value of a place, mm RAS, in voxels of 3 mm.
+template <typename Value>
+VoxelImage drawn(const Value& value) {
+  VoxelImage image;
+  image.dims = {70, 80, 80};
+  image.T_ras_voxel.linear() *= 3.0;
+  image.T_ras_voxel.translation() = Vec3(-105, -120, -130);
+  for (int k = 0; k < 80; ++k) {
+    for (int j = 0; j < 80; ++j) {
+      for (int i = 0; i < 70; ++i) image.values.push_back(value(image.T_ras_voxel * Vec3(i, j, k)));
+    }
+  }
+  return image;
+}
+
+// An ellipsoid of cerebrum with a brainstem below, and lesions on the right.
+float label_at(const Vec3& x) {
+  const Vec3 in = x.cwiseQuotient(Vec3(70, 85, 65));
+  if (Vec3(x - Vec3(0, -20, 0)).head<2>().norm() < 15.0 && x.z() < 0.0 && x.z() > -90.0) return 16;
+  return in.norm() < 1.0 ? 41.0F : 0.0F;
+}
+float lesion_at(const Vec3& x) {
+  const double away = (x - Vec3(40, 0, 30)).norm();
+  return away < 6.0 ? 1.0F : away < 9.0 ? 4.0F : away < 16.0 ? 2.0F : 0.0F;
+}
+
+class FirstCase : public testing::Test {
+ protected:
+  FirstCase() {
+    put("t1.nii", drawn([](const Vec3& x) { return label_at(x) > 0.0F ? 100.0F : 20.0F; }));
+    put("labels.nii", drawn(label_at));
+    put("brain.nii", drawn([](const Vec3& x) { return label_at(x) > 0.0F ? 1.0F : 0.0F; }));
+    put("tumour.nii", drawn(lesion_at));
+    options.mri = folder / "t1.nii";
+    options.labels = folder / "labels.nii";
+    options.tumour = folder / "tumour.nii";
+    options.position = "supine,left-30";
+    options.out = folder / "case.yaml";
+  }
+  void put(const std::string& name, const VoxelImage& image) {
+    ASSERT_TRUE(
+        io::write_nifti(folder / name, {{image.dims, image.T_ras_voxel}, image.values, ""}));
+  }
+  std::string refusal() {
+    return refusal_of(write_first_case(options), ErrorCode::kInvalidArgument);
+  }
+  CaseConfig written() {
+    value_or_fail(write_first_case(options));
+    return value_or_fail(io::read_case_config(options.out));
+  }
+  TemporaryFolder folder;
+  InitOptions options;
+};
+
+TEST_F(FirstCase, FromLabelsCanBePreparedAndSaysWhereEachGuessComesFrom) {
+  const CaseConfig config = written();
+  EXPECT_EQ(config.case_id, "case");
+  EXPECT_EQ(config.brain, folder / "case-brain.nii.gz");
+  EXPECT_LT((config.brainstem.centre_mm - Vec3(0, -20, -85)).norm(), 4.0);
+  EXPECT_GT(config.craniotomy.centre_mm.x(), 45.0);
+  EXPECT_GT(config.craniotomy.centre_mm.z(), 25.0);
+  EXPECT_LT((config.gravity_direction - Vec3(-0.5, -0.8660, 0)).norm(), 1e-3);
+  EXPECT_THAT(std::get<TumourLabel>(config.tumour).labels, ElementsAre(1, 4));
+  const std::string text = test_support::content_of(options.out);
+  EXPECT_THAT(text, AllOf(HasSubstr("# GUESS: the lowest 8 mm of the brainstem in labels.nii"),
+                          HasSubstr("all but 2, oedema"), HasSubstr("label 4 "),
+                          HasSubstr("From --position supine,left-30")));
+  const CaseView view = value_or_fail(view_case(options.out));
+  EXPECT_THAT(view.problems, IsEmpty());
+}
+
+TEST_F(FirstCase, FromAMaskTakesTheLowestPartNearTheMiddle) {
+  options.labels.clear();
+  options.brain = folder / "brain.nii";
+  const CaseConfig config = written();
+  EXPECT_EQ(config.brain, options.brain);
+  EXPECT_LT((config.brainstem.centre_mm - Vec3(0, -20, -85)).norm(), 4.0);
+  EXPECT_THAT(test_support::content_of(options.out), HasSubstr("tonsils"));
+}
+
+TEST_F(FirstCase, WhatIsMissingIsToldAtOnceAndACaseIsNeverReplaced) {
+  const InitOptions all = options;
+  options = {};
+  options.mri = all.mri;
+  EXPECT_THAT(refusal(), HasSubstr("missing: --brain or --labels, --tumour, --position, --out"));
+  options = all;
+  folder.write("case.yaml", "mine");
+  EXPECT_THAT(refusal(), HasSubstr("exists"));
+  EXPECT_EQ(test_support::content_of(options.out), "mine");
+}
+
+TEST_F(FirstCase, SeveralLabelsMustBeChosenByNumberOrByNameOfTheirTable) {
+  put("tumour.nii",
+      drawn([](const Vec3& x) { return lesion_at(x) > 0.0F ? lesion_at(x) + 10.0F : 0.0F; }));
+  EXPECT_THAT(refusal(), AllOf(HasSubstr("--tumour-label"), HasSubstr("11 ("), HasSubstr("14 (")));
+  EXPECT_FALSE(std::filesystem::exists(options.out));
+  options.tumour_label = "core";
+  EXPECT_THAT(refusal(), AllOf(HasSubstr("\"core\""), HasSubstr("there is none")));
+  folder.write("tumour.tsv", "index\tname\n11\tCore\n14\tRim\n");
+  options.tumour_label = "nose";
+  EXPECT_THAT(refusal(), HasSubstr("(\"Core\", \"Rim\")"));
+  options.tumour_label = "core,14";
+  EXPECT_THAT(std::get<TumourLabel>(written().tumour).labels, ElementsAre(11, 14));
+}
+
+TEST_F(FirstCase, LabelsOfAnotherNumberingAreRefusedByFile) {
+  options.labels = options.tumour;
+  EXPECT_THAT(refusal(), AllOf(HasSubstr("tumour.nii"), HasSubstr("FreeSurfer's numbers")));
+}
+
+TEST_F(FirstCase, ATumourOfADicomSegmentationIsWrittenBesideTheCase) {
+  options.tumour = folder.write("seg.dcm", io::Segmentation().set(1, 4).set(2, 4).bytes());
+  EXPECT_THAT(refusal(), AllOf(HasSubstr("--tumour-label: 1 \"Tumour\", 2 \"Oedema\"")));
+  options.tumour_label = "7";
+  EXPECT_THAT(refusal(), HasSubstr("has no such segment"));
+  options.tumour_label = "tumour";
+  const auto tumour = std::get<TumourLabel>(written().tumour);
+  EXPECT_THAT(tumour.labels, ElementsAre(1));
+  EXPECT_EQ(tumour.path, folder / "case-tumour.nii.gz");
+  const VoxelImage map = value_or_fail(io::read_volume(tumour.path));
+  EXPECT_EQ(map.at(1, 1, 0), 1.0F);
+  EXPECT_LT((map.T_ras_voxel * Vec3(1, 1, 0) - Vec3(4.5, -8, 10)).norm(), 1e-5);
+}
+
+TEST(OpeningOver, LiesOnTheOutsideAndNotInAHollow) {
+  const VoxelImage brain = drawn([](const Vec3& x) {
+    const bool hollow = x.y() > 20.0 && std::abs(x.x()) < 12.0 && std::abs(x.z()) < 15.0;
+    return !hollow && x.cwiseQuotient(Vec3(70, 85, 65)).norm() < 1.0 ? 1.0F : 0.0F;
+  });
+  const OpeningGuess guess = opening_over(brain, Vec3(5, 12, 0));
+  EXPECT_GT(guess.centre.norm(), 50.0);
+  EXPECT_GT(guess.outward.z(), -0.3);
+  EXPECT_GT(opening_over(brain, Vec3(40, 0, 30)).centre.x(), 45.0);
+}
+
+// A label map of a real head.
+TEST(FirstCaseOfARealHead, CanBePrepared) {
+  const char* data = std::getenv("BRAINSHIFT_EXTERNAL_DATA");
+  if (data == nullptr) GTEST_SKIP() << "BRAINSHIFT_EXTERNAL_DATA is not set";
+  const TemporaryFolder folder;
+  InitOptions options;
+  options.mri = options.labels = std::filesystem::path(data) / "synthseg_labels/seg_01.nii.gz";
+  options.tumour = options.labels;  // the right putamen stands for one
+  options.tumour_label = "51";
+  options.position = "supine,left-30";
+  options.out = folder / "case.yaml";
+  value_or_fail(write_first_case(options));
+  const CaseView view = value_or_fail(view_case(options.out));
+  EXPECT_THAT(view.problems, IsEmpty());
+  EXPECT_GT(opening_of(view).value().normal.z(), -0.5);
+}
+
+}  // namespace
+}  // namespace brainshift::client
