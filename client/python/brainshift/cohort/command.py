@@ -152,7 +152,8 @@ def participants(options: argparse.Namespace) -> int:
                 break
             done.append(participant.run(request, unit))
             stream = sys.stdout if done[-1].status == "done" else sys.stderr
-            print(f"brainshift-bids: {done[-1].line}", file=stream, flush=True)
+            stream.write(f"brainshift-bids: {done[-1].line}\n")  # at once: other workers write too
+            stream.flush()
         return done
 
     queue = list(found)
