@@ -30,7 +30,9 @@ TEST(PriorStrengths, RefuseWhatNamesNoStrength) {
 
 TEST(PriorStrengths, ScaleTheColumnsOfTheirPart) {
   CondensedOperators operators;
-  operators.part_columns = {2, 1, 0, 0, 0, 1, 0, 0, 2};
+  operators.part_columns = {2, 1};
+  operators.part_columns[static_cast<std::size_t>(PriorPart::kOpening)] = 1;
+  operators.part_columns[static_cast<std::size_t>(PriorPart::kCoarse)] = 2;
   PriorScaleValues strengths = {};
   strengths[static_cast<std::size_t>(PriorPart::kAlongGravity)] = 2.0;
   strengths[static_cast<std::size_t>(PriorPart::kOpening)] = 3.0;
@@ -85,7 +87,7 @@ TEST(MeshPoint, InterpolatesNodalValues) {
 TEST(LeftOutSd, AddsTheRemaindersVariances) {
   CondensedOperators operators;
   operators.truncated_variance_mm2.resize(2, kRemainders);
-  operators.truncated_variance_mm2 << 1, 2, 1, 9, 0, 0;
+  operators.truncated_variance_mm2 << 1, 2, 1, 0, 9, 0, 0, 0;
   operators.control_neighbours.setZero(4, 2);
   operators.control_neighbours(0, 1) = 1;
   operators.control_weights.setZero(4, 2);
