@@ -151,7 +151,7 @@ class Held:
         self.kind, self.name, self.change = kind, name, change
         self.differences = differences(default, variant)
         self.time = median_time_ratio(default, variant)
-        counting = sorted((one for one in self.differences if one.counts()), key=lambda one: -abs(one.change()))
+        counting = sorted((one for one in self.differences if one.counts()), key=lambda one: -round(abs(one.change()), 9))
         # Without the part worse, or, where it was added, with it better.
         self.buys = [one for one in counting if (one.of_variant > one.of_default) != (kind == "added")]
         self.costs = [one for one in counting if one not in self.buys]

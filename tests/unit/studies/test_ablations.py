@@ -116,7 +116,7 @@ def test_a_part_buys_what_is_worse_without_it_and_an_added_one_what_is_better_wi
     held = {one.name: one for one in ablations.held_parts(table_of(made_up()))}
     contact, rank = held["contact"], held["a higher rank"]
     assert len(contact.buys) == len(rank.buys) == 12 and not contact.costs and not rank.costs
-    assert contact.buys == sorted(contact.buys, key=lambda one: -abs(one.change()))  # the largest first
+    assert contact.buys == sorted(contact.buys, key=lambda one: -round(abs(one.change()), 9))  # the largest first
     worse = [{**one, "variant": {"fixed": "high-rank", "high-rank": "fixed"}.get(one["variant"], one["variant"])}
              for one in made_up()]
     held = {one.name: one for one in ablations.held_parts(table_of(worse))}
