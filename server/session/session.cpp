@@ -149,8 +149,8 @@ void Session::stop() {
 
 // ---------- observations ----------
 
-Result<Admission> Session::submit(Observation observation, TimePoint now,
-                                  const std::string& client, std::chrono::nanoseconds asleep) {
+Result<Admission> Session::submit(Observation observation, TimePoint now, const std::string& client,
+                                  std::chrono::nanoseconds asleep) {
   if (!running_) {
     return fail(ErrorCode::kModelNotReady, coming() ? "the session is still being prepared"
                                                     : "no session is running: start one first");

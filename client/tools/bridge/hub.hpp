@@ -26,8 +26,8 @@
 #include <vector>
 
 #include "client/tools/bridge/peer.hpp"
-#include "common/core/stopwatch.hpp"
 #include "common/core/error.hpp"
+#include "common/core/stopwatch.hpp"
 
 namespace brainshift::client {
 

@@ -234,9 +234,11 @@ Status run_export(ExportArguments& arguments, bool spacing_given) {
 constexpr const char* kFooter =
     "Directions:\n"
     "  resampling  x + v(x) is where the deformed point x was: warps images (ITK, ANTs, elastix,\n"
-    "              plastimatch), on the grid of the deformed brain. For 3D Slicer always this one,\n"
+    "              plastimatch), on the grid of the deformed brain. For 3D Slicer always this "
+    "one,\n"
     "              for images and models: it takes the files for from-parent and inverts them\n"
-    "  modeling    x + v(x) is where the undeformed point x goes: moves points and models; not for\n"
+    "  modeling    x + v(x) is where the undeformed point x goes: moves points and models; not "
+    "for\n"
     "              3D Slicer, which before 5.10 takes such a file for resampling\n"
     "Formats, --formats A,B: nifti-1007 nifti-1006 nrrd itk sd known jacobian surfaces; series\n"
     "(every usable field, .vtu and .pvd, as journal export --vtu) on request; all.\n"
