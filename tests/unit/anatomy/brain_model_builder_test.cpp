@@ -215,12 +215,16 @@ TEST(BrainModelBuilder, LabelVolumeGivesTheSurfaceOfEachFocus) {
   EXPECT_TRUE(geometry::is_closed(tumour));
   for (int v = 0; v < tumour.num_vertices(); ++v) {
     const Vec3 x = tumour.vertices.col(v);
-    EXPECT_LT(std::min(std::abs((x - centre).norm() - 12.0), std::abs((x - other).norm() - 5.0)),
-              0.7);
+    const double of_large = (x - centre).norm(), of_small = (x - other).norm();
+    if (std::abs(of_large - 12.0) < std::abs(of_small - 5.0)) {
+      EXPECT_NEAR(of_large, 12.0, 0.5);  // half a voxel
+    } else {
+      EXPECT_NEAR(of_small, 5.0, 0.7);  // and what smoothing takes of a small ball
+    }
   }
-  // Smoothing shrinks the radius by sigma^2 / r.
+  // Smoothing shrinks the radius by sigma^2 / r: 0.08 mm of the large ball, 2 % of the volume.
   const double whole = geometry::balls::ball_volume(12.0) + geometry::balls::ball_volume(5.0);
-  EXPECT_NEAR(geometry::enclosed_volume(tumour) / whole, 0.97, 0.03);
+  EXPECT_NEAR(geometry::enclosed_volume(tumour) / whole, 0.98, 0.02);
   ASSERT_EQ(notes.size(), 1u);
   EXPECT_THAT(notes[0], ::testing::HasSubstr("2 parts: 7.2"));
 }
