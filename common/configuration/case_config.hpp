@@ -171,6 +171,9 @@ struct SensingConfig {
   // What neighbouring points of a tumour boundary are off by alike along the normal, beside the
   // noise that their observation states (docs/decisions/0029, 0031).
   double boundary_error_sd_mm = 0.4;
+  // What neighbours on the outline are off by alike besides is a common error of unknown size
+  // (docs/decisions/0039).
+  bool boundary_outline_errors = true;
   // Of a boundary's points those within this distance are averaged (docs/decisions/0031). 0: none.
   double boundary_average_mm = 3.0;
   // How well the image that landmarks were found in during surgery is registered: an error that all

@@ -31,6 +31,7 @@ std::string key_of(const CaseConfig& config, const std::filesystem::path& member
 
 inline constexpr Word<bool> kScalesWords[] = {{true, "estimated"}, {false, "fixed"}};
 inline constexpr Word<bool> kOutlierWords[] = {{true, "downweighted"}, {false, "kept"}};
+inline constexpr Word<bool> kOutlineWords[] = {{true, "estimated"}, {false, "none"}};
 inline constexpr Word<SurfaceGuidance> kGuidanceWords[] = {
     {SurfaceGuidance::kDistances, "distances"}, {SurfaceGuidance::kRigid, "rigid"}};
 inline constexpr Word<OutsideRegion> kOutsideWords[] = {{OutsideRegion::kExtend, "extend"},
@@ -327,6 +328,13 @@ void visit(A& a, V& v) {
      "noise that their observation states: standard deviation of the tracker's errors and the like",
      "docs/decisions/0031", "Used with tumour: distances."},
     v.boundary_error_sd_mm, between(0.0, 100.0));
+  a({"boundary_outline_errors", "",
+     "What neighbours on the tumour's outline are off by alike besides, up to 0.5 mm over 5 or 10 "
+     "mm",
+     "docs/decisions/0039",
+     "estimated: size and length from the data of the update (method condensed). Used with tumour: "
+     "distances."},
+    v.boundary_outline_errors, kOutlineWords);
   a({"boundary_average_mm", "mm",
      "A point of a tumour boundary that guides the model stands for the points within this "
      "distance, by the median of their distances",

@@ -146,6 +146,7 @@ Result<RegisteredObservation> from_boundary(const TumourBoundary& body,
   options.average_mm = config.sensing.boundary_average_mm;
   options.pose_sd_mm = config.sensing.probe_pose_sd_mm;
   options.pose_sd_deg = config.sensing.probe_pose_sd_deg;
+  options.outline_errors = config.sensing.boundary_outline_errors;
   options.fewest = 3;
   options.measured = "tumour boundary";
   options.surface = "tumour";

@@ -150,6 +150,7 @@ Result<SurfaceDistances> SurfaceDistances::build(std::shared_ptr<const IndexedPa
         measured.col(over[static_cast<std::size_t>(guiding[i])]);
   }
   made.sd_mm_ = VecX::Constant(made.guiding_.cols(), sd_mm);
+  if (options.outline_errors) made.outline_ = outline_errors(data.positions(Eigen::all, guiding));
   if (options.average_mm > 0.0) made.average(data, guiding);
   return made;
 }
@@ -218,13 +219,27 @@ SparseData SurfaceDistances::measure(Points vertices, const Points& measured, co
   return data;
 }
 
-SparseData SurfaceDistances::first() const {
-  return measure(first_vertices(), guiding_, sd_mm_, nullptr);
+SparseData SurfaceDistances::first() const { return measure_guiding(first_vertices()); }
+
+SparseData SurfaceDistances::measure_guiding(Points vertices) const {
+  std::vector<int> kept;
+  SparseData data = measure(std::move(vertices), guiding_, sd_mm_, &kept);
+  const Eigen::Index errors = outline_.columns.cols(), size = data.size();
+  if (errors == 0 || size == 0) return data;
+  const Eigen::Index pose = data.common_error.cols();
+  data.common_error.conservativeResize(3 * size, pose + errors);
+  for (Eigen::Index i = 0; i < size; ++i) {
+    data.common_error.block(3 * i, pose, 3, errors) =
+        data.directions.col(i) * outline_.columns.row(kept[static_cast<std::size_t>(i)]);
+  }
+  data.common_variance.setOnes(pose + errors, outline_.variances.cols());
+  data.common_variance.bottomRows(errors) = outline_.variances;
+  return data;
 }
 
 SparseData SurfaceDistances::at(const Points& u) const {
   const SurfacePatch& patch = patch_->patch();
-  return measure(patch.surface.vertices + u * patch.weights, guiding_, sd_mm_, nullptr);
+  return measure_guiding(patch.surface.vertices + u * patch.weights);
 }
 
 bool SurfaceDistances::moved(const SparseData& before, const SparseData& now) const {

@@ -34,6 +34,7 @@
 #include "common/core/types.hpp"
 #include "common/geometry/closest_point.hpp"
 #include "common/geometry/moving_surface.hpp"
+#include "common/registration/outline_errors.hpp"
 #include "common/values/brain_model.hpp"
 #include "common/values/sparse_data.hpp"
 
@@ -85,6 +86,9 @@ struct SurfaceDistanceOptions {
   double average_mm = 0.0;
   double pose_sd_mm = 0.0;   // of the instrument's place: three common errors (none if 0)
   double pose_sd_deg = 0.0;  // of its direction, about the points' centroid: three more
+  // What neighbours on the surface as it was outlined are off by alike, of unknown size
+  // (outline_errors.hpp): common errors of the data.
+  bool outline_errors = false;
   // Fewer points over the surface are an error, in these words.
   int fewest = 10;
   std::string measured = "cortical surface", surface = "craniotomy";
@@ -125,6 +129,8 @@ class SurfaceDistances {
   // of the surface with these vertices. `kept`, if not null, receives their indices.
   SparseData measure(Points vertices, const Points& measured, const VecX& sd_mm,
                      std::vector<int>* kept) const;
+  // measure() of the guiding points, with what they are off by alike.
+  SparseData measure_guiding(Points vertices) const;
   // Moves the guiding points along their normals to the medians, and sets their standard
   // deviations. data: of all points that were measured; guiding: which of them guide.
   void average(const SparseData& data, const std::vector<int>& guiding);
@@ -133,8 +139,9 @@ class SurfaceDistances {
   std::shared_ptr<const IndexedPatch> patch_;
   SurfaceDistanceOptions options_;
   RigidTransform T_undeformed_measured_;
-  Points guiding_;  // the measured points in use
-  VecX sd_mm_;      // of their distances
+  Points guiding_;         // the measured points in use
+  VecX sd_mm_;             // of their distances
+  OutlineErrors outline_;  // of the guiding points; none: no columns
 };
 
 // Closest point projection distance (paper 2.7) from nodes to a measured surface of the brain.

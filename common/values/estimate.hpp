@@ -88,6 +88,8 @@ inline constexpr PriorScaleValues kAsInTheCase = {1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 
 struct Hypothesis {
   PriorScaleValues scales = kAsInTheCase;  // 0: the part is absent
   double weight = 1.0;                     // of all hypotheses of an estimate: sum 1
+  // Of the outline's errors (kOutlineErrors, sparse_data.hpp). Not on the wire.
+  int error = 0;
 };
 
 struct ContactSummary {

@@ -72,6 +72,8 @@ std::vector<Part> data_parts() {
          [](CaseConfig& c) { c.sensing.robust_weights = false; }),
       of("no-boundary-error", {"sensing.boundary_error_sd_mm"},
          [](CaseConfig& c) { c.sensing.boundary_error_sd_mm = 0.0; }),
+      of("no-outline-errors", {"sensing.boundary_outline_errors"},
+         [](CaseConfig& c) { c.sensing.boundary_outline_errors = false; }),
       of("no-averages", {"sensing.boundary_average_mm"},
          [](CaseConfig& c) { c.sensing.boundary_average_mm = 0.0; }),
       of("rigid-tumour", {"sensing.tumour"},

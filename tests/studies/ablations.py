@@ -47,6 +47,7 @@ PARTS = {
         ("no-shared-errors", "shared errors of a surface", "`sensing.surface_pose_sd_mm: 0`, `_deg: 0`"),
         ("no-robust-weights", "robust weights", "`sensing.outliers: kept`"),
         ("no-boundary-error", "error of a boundary's points", "`sensing.boundary_error_sd_mm: 0`"),
+        ("no-outline-errors", "shared errors of the tumour's outline", "`sensing.boundary_outline_errors: none`"),
         ("no-averages", "averages of a boundary's points", "`sensing.boundary_average_mm: 0`"),
         ("rigid-tumour", "tumour as distances", "`sensing.tumour: rigid`"),
         ("rigid-cortex", "cortex as distances", "`sensing.surface: rigid`"),

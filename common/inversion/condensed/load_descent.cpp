@@ -81,7 +81,7 @@ double LoadDescent::objective(SampledOperators& sampled, const PriorStrengths& s
     const double s = strengths.scale_of(i);
     if (s > 0.0) sum += z[i] * z[i] / (s * s);
   }
-  return misfit(sampled, z) + 0.5 * sum;
+  return misfit(sampled, strengths, z) + 0.5 * sum;
 }
 
 Status LoadDescent::minimise(const PriorStrengths& strengths) {
@@ -89,7 +89,8 @@ Status LoadDescent::minimise(const PriorStrengths& strengths) {
   return posterior_.minimise(strengths);
 }
 
-double LoadDescent::misfit(SampledOperators& sampled, const VecX& z) {
+double LoadDescent::misfit(SampledOperators& sampled, const PriorStrengths& strengths,
+                           const VecX& z) {
   const StageClock clock(profile_, UpdateStage::kGradient);
   const auto free_body = sampled.free_body();
   const int q = sampled.common();
@@ -100,14 +101,20 @@ double LoadDescent::misfit(SampledOperators& sampled, const VecX& z) {
   }
   double sum = whitened_.squaredNorm();
   if (q > 0) {
-    const auto common = free_body.leftCols(q);
-    normal_.noalias() = common.transpose() * common;
+    common_sd_.resize(q);
+    for (int k = 0; k < q; ++k) common_sd_[k] = posterior_.common_sd(k, strengths.held_error());
+    // Contact does not touch the common errors.
+    normal_ = posterior_.gram().topLeftCorner(q, q);
+    normal_.array().colwise() *= common_sd_.array();
+    normal_.array().rowwise() *= common_sd_.transpose().array();
     normal_.diagonal().array() += 1.0;
-    right_.noalias() = common.transpose() * whitened_;
+    right_.noalias() = free_body.leftCols(q).transpose() * whitened_;
+    right_.array() *= common_sd_.array();
     common_amplitudes_ = right_;
     Eigen::LLT<Eigen::Ref<Eigen::MatrixXd>> factor(normal_);
     factor.solveInPlace(common_amplitudes_);
     sum -= right_.dot(common_amplitudes_);
+    common_amplitudes_.array() *= common_sd_.array();
   }
   return 0.5 * sum;
 }
@@ -358,7 +365,7 @@ Status LoadDescent::average(SampledOperators& sampled, PriorStrengths& strengths
     return fail(ErrorCode::kNotFinite, "inversion: the mean over the hypotheses is not finite");
   }
   if (auto status = return_contact(); !status) return status;
-  const double most_probable = misfit(sampled, z_);
+  const double most_probable = misfit(sampled, strengths, z_);
   step_ = shift.tail(window_.count);
   double length = reach(contact_.penetration(), most_changes() / 2);
   for (;; length *= 0.5) {
@@ -369,7 +376,7 @@ Status LoadDescent::average(SampledOperators& sampled, PriorStrengths& strengths
       if (length == 0.0 || !limits.out_of_time()) return status;
       continue;
     }
-    if (length == 0.0 || misfit(sampled, mean_z_) <= most_probable + kLostByMean) break;
+    if (length == 0.0 || misfit(sampled, strengths, mean_z_) <= most_probable + kLostByMean) break;
   }
   posterior_.set_answer(length * shift.head(posterior_.unknowns() - window_.count), mean_z_);
   return {};

@@ -4,10 +4,10 @@
 // For fixed loads z contact has one solution u(z) (contact_at_loads.hpp). The most probable z
 // minimises
 //
-//   J(z) = min over c of 1/2 |R^-1/2 (d - A u(z) - common c)|^2 + 1/2 |c|^2 + 1/2 |x|^2,   z = S x
+//   J(z) = min over c of 1/2 |R^-1/2 (d - A u(z) - common c)|^2 + 1/2 |V^-1/2 c|^2 + 1/2 |x|^2
 //
-// with S the strengths of the prior's parts. J is continuous and piecewise quadratic, one piece for
-// each active set. The linear model of one set gives the second derivative H and the Newton step to
+// with z = S x, S the strengths of the prior's parts and V the common errors' variances. J is
+// continuous and piecewise quadratic, one piece for each active set. The linear model of one set gives the second derivative H and the Newton step to
 // its piece's minimum. The gradient of any other piece is cheap: by the adjoint, one solve with the
 // compliance of its slaves. J is searched in two ways:
 //
@@ -136,7 +136,7 @@ class LoadDescent {
   // trial_ becomes z_; contact_ is there already.
   void accept_trial();
   // The first sum of J at z, whose contact is solved, without the loads' own.
-  double misfit(SampledOperators& sampled, const VecX& z);
+  double misfit(SampledOperators& sampled, const PriorStrengths& strengths, const VecX& z);
   // J at z, whose contact is solved. Precondition: z has no modes of absent parts.
   double objective(SampledOperators& sampled, const PriorStrengths& strengths, const VecX& z);
   // next_: the whitened Newton step at trial_ of the piece that its contact is on. Precondition:
@@ -152,12 +152,12 @@ class LoadDescent {
   ContactReach reach_;
   ModePosterior posterior_;
   VecX z_, trial_, step_, gradient_, shift_, mean_z_;
-  VecX predicted_;                                       // forces, N
-  VecX penetration_;                                     // of every slave at z_, mm
-  VecX newton_, next_, direction_, change_;              // whitened
-  double value_ = 0.0, after_ = 0.0;                     // J at z_ and at trial_
-  VecX whitened_, adjoint_, common_amplitudes_, right_;  // of the last objective()
-  linalg::GrowingVector felt_;                           // by the active slaves
+  VecX predicted_;                                                   // forces, N
+  VecX penetration_;                                                 // of every slave at z_, mm
+  VecX newton_, next_, direction_, change_;                          // whitened
+  double value_ = 0.0, after_ = 0.0;                                 // J at z_ and at trial_
+  VecX whitened_, adjoint_, common_amplitudes_, right_, common_sd_;  // of the last objective()
+  linalg::GrowingVector felt_;                                       // by the active slaves
   Eigen::MatrixXd normal_;
   QuasiNewton curvature_;
   NewtonBundle bundle_;

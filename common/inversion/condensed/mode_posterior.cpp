@@ -104,6 +104,7 @@ void ModePosterior::follow_changes(SampledOperators& sampled, const ContactReduc
 void ModePosterior::linearise(SampledOperators& sampled, const ContactReduction& reduction,
                               bool same_data, ThreadTeam& team) {
   common_ = sampled.common();
+  common_variance_ = sampled.common_variance();
   rows_ = sampled.rows();
   const Eigen::Index r = window_.count, size = unknowns();
   auto j = jacobian_.topLeftCorner(rows_, size + 1);
@@ -137,7 +138,7 @@ void ModePosterior::linearise(SampledOperators& sampled, const ContactReduction&
 }
 
 void ModePosterior::fill_scales(const PriorStrengths& strengths) {
-  scales_.head(common_).setOnes();
+  for (int k = 0; k < common_; ++k) scales_[k] = common_sd(k, strengths.held_error());
   for (int i = 0; i < window_.count; ++i) scales_[common_ + i] = strengths.scale_of(i);
 }
 
@@ -233,25 +234,26 @@ bool ModePosterior::check_source(const SampledOperators& sampled, const PriorStr
   own_gram_.resize(size, size);
   blas::gram(own, 0.0, own_gram_);
   own_right_.noalias() = own.transpose() * jacobian_.col(size).segment(first, count);
-  const auto run = [&](const PriorScaleValues& scales, Consistency& result) {
+  const auto run = [&](const Hypothesis& hypothesis, Consistency& result) {
     // The check wants the prior's information; that of an absent part is as good as infinite.
     constexpr double kAbsentScale = 1e-4;
-    precision_.head(common_).setOnes();
-    for (int i = 0; i < window_.count; ++i) {
-      precision_[common_ + i] = std::pow(std::max(kAbsentScale, strengths.scale_of(i, scales)), -2);
+    for (int i = 0; i < size; ++i) {
+      const double scale = i < common_ ? common_sd(i, hypothesis.error)
+                                       : strengths.scale_of(i - common_, hypothesis.scales);
+      precision_[i] = std::pow(std::max(kAbsentScale, scale), -2);
     }
     return check_.run(gram(), right_hand_side(), own_gram_, own_right_, precision_.head(size),
                       result);
   };
   const auto& hypotheses = strengths.hypotheses();
-  if (!run(strengths.held(), out)) return false;
+  if (!run(hypotheses.front(), out)) return false;
   if (out.p_value >= kInconsistent) return true;
   double mean = hypotheses.front().weight * out.p_value;
   double left = 1.0 - hypotheses.front().weight;
   for (std::size_t h = 1; h < hypotheses.size(); ++h) {
     if (mean >= kInconsistent || mean + left < kInconsistent) break;
     Consistency other;
-    if (!run(hypotheses[h].scales, other)) return false;
+    if (!run(hypotheses[h], other)) return false;
     mean += hypotheses[h].weight * other.p_value;
     left -= hypotheses[h].weight;
   }

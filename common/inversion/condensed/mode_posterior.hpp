@@ -4,11 +4,14 @@
 //
 //   whitened data   [common | J | d - A G f0]                               rows x (q + r + 1)
 //                   = R^-1/2 [common error | A U - A G_A T | d - A G_A f0]
-//   objective       J(z) = 1/2 |d - J z - common c|^2 + 1/2 |c|^2 + 1/2 |x|^2,   z = S x
+//   objective       J(z) = 1/2 |d - J z - common c|^2 + 1/2 |V^-1/2 c|^2 + 1/2 |x|^2,   z = S x
 // with T and f0 of ContactReduction, S the strengths of the prior's parts (0: the part is absent),
+// V the common errors' variances under the held hypothesis (SparseData::common_variance),
 // everything whitened by SampledOperators. Contact does not touch the common error. Nothing is
 // allocated as long as the data fit what was reserved.
 #pragma once
+
+#include <cmath>
 
 #include "common/core/error.hpp"
 #include "common/core/thread_team.hpp"
@@ -17,6 +20,7 @@
 #include "common/inversion/skull/contact_reduction.hpp"
 #include "common/inversion/strengths/prior_strengths.hpp"
 #include "common/linalg/blas.hpp"
+#include "common/linalg/growing_matrix.hpp"
 #include "common/values/sparse_data.hpp"
 
 namespace brainshift::inversion {
@@ -64,6 +68,10 @@ class ModePosterior {
   // was for the same data and for the set before, so that J follows the reduction's changes.
   void linearise(SampledOperators& sampled, const ContactReduction& reduction, bool same_data,
                  ThreadTeam& team);
+  // Standard deviation of common error `k` under an error hypothesis.
+  double common_sd(Eigen::Index k, int error) const {
+    return common_variance_.cols() > 0 ? std::sqrt(common_variance_(k, error)) : 1.0;
+  }
   // Minimises the objective for the held strengths and takes the minimum for the answer.
   // kNotFinite when the normal equations are not positive definite.
   Status minimise(const PriorStrengths& strengths);
@@ -122,7 +130,8 @@ class ModePosterior {
   Eigen::Index rows_ = 0;
   Eigen::MatrixXd jacobian_, changed_;  // changed_: R^-1/2 A of what changes of the set move
   VecX residual_, gram_storage_, factor_storage_, right_, solution_, z_;
-  VecX scales_;  // 1 for c, s for z
+  VecX scales_;  // V^1/2 for c, s for z
+  linalg::GrowingMatrix common_variance_;
   mutable VecX full_;
   double misfit_ratio_ = 0.0;
   SourceCheck check_;

@@ -65,6 +65,7 @@ Status SampledOperators::locate(const SparseData& data) {
   outside_region_ = 0;
   std::fill(has_column_.begin(), has_column_.end(), char{0});
   common_ = data.common_error.rows() > 0 ? static_cast<int>(data.common_error.cols()) : 0;
+  common_variance_ = data.common_variance;
   first_row_[0] = 0;
   for (int i = 0; i < size_; ++i) {
     const geometry::TetLocation location = locator_->locate(data.positions.col(i));

@@ -21,6 +21,7 @@
 #include "common/geometry/tet_locator.hpp"
 #include "common/inversion/skull/mode_window.hpp"
 #include "common/linalg/blas.hpp"
+#include "common/linalg/growing_matrix.hpp"
 #include "common/operators/condensed_operators.hpp"
 #include "common/values/sparse_data.hpp"
 
@@ -50,6 +51,8 @@ class SampledOperators {
   // Data whose variance depends on the strengths.
   int data_outside_region() const { return outside_region_; }
   int common() const { return common_; }  // q
+  // SparseData::common_variance of the data that locate() was given.
+  const linalg::GrowingMatrix& common_variance() const { return common_variance_; }
   // mm, with what the modes leave out and the robust weight.
   double sd(int datum) const { return sd_[datum]; }
   auto free_body() const { return free_body_.topLeftCorner(rows(), common_ + window_.count + 1); }
@@ -94,6 +97,7 @@ class SampledOperators {
   int size_ = 0, common_ = 0, capacity_ = 0, outside_region_ = 0;
   Eigen::Matrix<int, 4, Eigen::Dynamic> rows_;  // 4 x m, row of each node in the sampled array
   NodeWeights barycentric_, weights_;           // 4 x m; weights_: / sd
+  linalg::GrowingMatrix common_variance_;       // q x hypotheses
   Points directions_;                           // 3 x m, zero: whole
   std::vector<int> first_row_;                  // m + 1
   Eigen::Matrix<double, kRemainders, Eigen::Dynamic> left_out_;  // at unit strength, mm^2

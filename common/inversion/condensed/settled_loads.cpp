@@ -184,13 +184,14 @@ Status SettledLoads::distrust_outliers() {
 
 Status SettledLoads::fit() {
   const StageClock clock(profile_, UpdateStage::kHypotheses);
-  return strengths_.fit(descent_.posterior().gram(), descent_.posterior().right_hand_side());
+  return strengths_.fit(descent_.posterior().gram(), descent_.posterior().right_hand_side(),
+                        data_->common_variance);
 }
 
 Result<bool> SettledLoads::refit(bool may_change) {
   const StageClock clock(profile_, UpdateStage::kHypotheses);
   return strengths_.refit(descent_.posterior().gram(), descent_.posterior().right_hand_side(),
-                          may_change);
+                          may_change, data_->common_variance);
 }
 
 Status SettledLoads::find_strengths(const DescentLimits& limits, EstimateStatus& outcome) {

@@ -109,6 +109,19 @@ Status check_data(const SparseData& data) {
     return fail(ErrorCode::kNotFinite,
                 "sparse data: common_error holds a value that is not finite");
   }
+  const Eigen::MatrixXd& variance = data.common_variance;
+  if (variance.cols() > 0) {
+    const Eigen::Index errors = common.rows() > 0 ? common.cols() : 0;
+    if (variance.rows() != errors || variance.cols() > Eigen::Index{kOutlineErrors.size()}) {
+      return invalid(
+          fmt::format("sparse data: common_variance is {} x {}: must have {} rows, one for each "
+                      "common error, and at most {} columns",
+                      variance.rows(), variance.cols(), errors, kOutlineErrors.size()));
+    }
+    if (!(variance.array() >= 0.0 && variance.array() <= 1.0).all()) {
+      return invalid("sparse data: common_variance holds a value outside 0 to 1");
+    }
+  }
   if (m < 3) return invalid(fmt::format("sparse data: {} points, at least 3 are needed", m));
   for (int i = 0; i < m; ++i) {
     if (!data.positions.col(i).allFinite() || !data.displacements.col(i).allFinite() ||

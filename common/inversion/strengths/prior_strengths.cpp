@@ -2,6 +2,7 @@
 #include "common/inversion/strengths/prior_strengths.hpp"
 
 #include <algorithm>
+#include <tuple>
 
 namespace brainshift::inversion {
 namespace {
@@ -84,7 +85,7 @@ PriorStrengths::PriorStrengths(const PerPart<int>& columns, ModeWindow window, i
   }
   hypotheses_.reserve(kMaxHypotheses + 1);
   done_.reserve(kMaxHypotheses + 1);
-  candidates_.reserve((1 + kPriorParts) * kPriorParts * kStrengths.size());
+  candidates_.reserve((1 + kPriorParts + kOutlineErrors.size()) * kPriorParts * kStrengths.size());
   reset();
 }
 
@@ -117,14 +118,14 @@ void PriorStrengths::set_far(PriorScaleValues& scales) const {
   of(PriorPart::kFar) = std::max({kBeforeData, of(PriorPart::kMedium), of(PriorPart::kCoarse)});
 }
 
-PriorScaleValues PriorStrengths::broad() const {
-  PriorScaleValues scales = as_in_the_case();
-  if (!estimate_) return scales;
-  for (std::size_t part = 0; part < scales.size(); ++part) {
-    scales[part] *= std::max(kBeforeData, held()[part]);
+Hypothesis PriorStrengths::broad() const {
+  Hypothesis result{as_in_the_case(), broad_weight_, held_error()};
+  if (!estimate_) return result;
+  for (std::size_t part = 0; part < result.scales.size(); ++part) {
+    result.scales[part] *= std::max(kBeforeData, held()[part]);
   }
-  set_far(scales);
-  return scales;
+  set_far(result.scales);
+  return result;
 }
 
 PriorScaleValues PriorStrengths::absent_parts() const {
@@ -135,10 +136,18 @@ PriorScaleValues PriorStrengths::absent_parts() const {
   return scales;
 }
 
-PerPart<double> PriorStrengths::variances(const PriorScaleValues& scales) const {
-  PerPart<double> result{};
-  for (std::size_t part = 0; part < result.size(); ++part) result[part] = variance(part, scales);
+Variances PriorStrengths::variances(const Hypothesis& hypothesis) const {
+  Variances result{{}, hypothesis.error};
+  for (std::size_t part = 0; part < result.size(); ++part) {
+    result[part] = variance(part, hypothesis.scales);
+  }
   return result;
+}
+
+double PriorStrengths::log_prior_of_error(int error) const {
+  const int errors = evidence_.errors();
+  if (errors == 1) return 0.0;
+  return std::log(error == 0 ? kNoOutlineError : (1.0 - kNoOutlineError) / (errors - 1));
 }
 
 PerPart<double> PriorStrengths::floors() const {
@@ -155,22 +164,23 @@ void PriorStrengths::add_prior(Profiles& log_p) const {
   }
 }
 
-bool PriorStrengths::log_posterior(const PriorScaleValues& scales, Workspace& work,
+bool PriorStrengths::log_posterior(const Hypothesis& hypothesis, Workspace& work,
                                    double& out) const {
-  if (!evidence_.log_evidence(variances(scales), work, out)) return false;
+  if (!evidence_.log_evidence(variances(hypothesis), work, out)) return false;
+  out += log_prior_of_error(hypothesis.error);
   for (std::size_t part = 0; part < count_.size(); ++part) {
-    if (searched(part)) out += log_prior_[index_of(scales[part])];
+    if (searched(part)) out += log_prior_[index_of(hypothesis.scales[part])];
   }
   return true;
 }
 
-bool PriorStrengths::ascend(PriorScaleValues& scales, Projection& projection,
-                            Workspace& work) const {
+bool PriorStrengths::ascend(Hypothesis& hypothesis, Projection& projection, Workspace& work) const {
+  PriorScaleValues& scales = hypothesis.scales;
   Profiles log_p{};
   for (int step = 0; step < kMaxSteps; ++step) {
     double gain = 0.0;
     std::size_t best_part = 0, best_strength = 0;
-    const PerPart<double> own = variances(scales);
+    const Variances own = variances(hypothesis);
     if (!evidence_.project(own, projection, work) ||
         !evidence_.profiles(projection, own, floors(), log_p, work)) {
       return false;
@@ -184,35 +194,63 @@ bool PriorStrengths::ascend(PriorScaleValues& scales, Projection& projection,
       best_part = part;
       best_strength = static_cast<std::size_t>(best - log_p[part].begin());
     }
-    if (gain <= kMinGain) return true;
-    scales[best_part] = kStrengths[best_strength];
+    if (gain > kMinGain) {
+      scales[best_part] = kStrengths[best_strength];
+      continue;
+    }
+    const int before = hypothesis.error;
+    if (!ascend_error(hypothesis, work)) return false;
+    if (hypothesis.error == before) return true;
   }
   return true;
 }
 
-bool PriorStrengths::search(PriorScaleValues& best) {
-  struct Ascent {
-    PriorScaleValues scales;
+bool PriorStrengths::ascend_error(Hypothesis& hypothesis, Workspace& work) const {
+  if (evidence_.errors() == 1) return true;
+  Hypothesis tried = hypothesis;
+  double best = 0.0;
+  if (!log_posterior(hypothesis, work, best)) return false;
+  for (tried.error = 0; tried.error < evidence_.errors(); ++tried.error) {
     double log_p = 0.0;
-    bool done = false;
-  };
-  std::array<Ascent, 2> ascents{Ascent{absent_parts()}, Ascent{as_in_the_case()}};
-  team_->split(2, [&](long begin, long end) {
-    for (long i = begin; i < end; ++i) {
-      Ascent& each = ascents[static_cast<std::size_t>(i)];
-      const auto member = static_cast<std::size_t>(begin) % works_.size();
-      Workspace& work = works_[member];
-      each.done = ascend(each.scales, projections_[member], work) &&
-                  log_posterior(each.scales, work, each.log_p);
-    }
-  });
-  if (!ascents[0].done || !ascents[1].done) return false;
-  best = ascents[ascents[1].log_p > ascents[0].log_p ? 1 : 0].scales;
+    if (!log_posterior(tried, work, log_p)) return false;
+    if (log_p <= best + kMinGain) continue;
+    best = log_p;
+    hypothesis.error = tried.error;
+  }
   return true;
 }
 
-bool PriorStrengths::weigh(const PriorScaleValues& best) {
-  const PerPart<double> own = variances(best);
+bool PriorStrengths::search(Hypothesis& best) {
+  struct Ascent {
+    Hypothesis hypothesis;
+    double log_p = 0.0;
+    bool done = false;
+  };
+  const int last = evidence_.errors() - 1;
+  std::array<Ascent, 4> ascents{
+      Ascent{{absent_parts(), 1.0, 0}}, Ascent{{as_in_the_case(), 1.0, 0}},
+      Ascent{{absent_parts(), 1.0, last}}, Ascent{{as_in_the_case(), 1.0, last}}};
+  const std::size_t starts = last > 0 ? 4 : 2;
+  auto ascend_from = [&](int member) {
+    const auto own = static_cast<std::size_t>(member);
+    for (std::size_t i = own; i < starts; i += works_.size()) {
+      Ascent& each = ascents[i];
+      each.done = ascend(each.hypothesis, projections_[own], works_[own]) &&
+                  log_posterior(each.hypothesis, works_[own], each.log_p);
+    }
+  };
+  team_->run(ascend_from);
+  const Ascent* found = nullptr;
+  for (std::size_t i = 0; i < starts; ++i) {
+    if (!ascents[i].done) return false;
+    if (found == nullptr || ascents[i].log_p > found->log_p) found = &ascents[i];
+  }
+  best = found->hypothesis;
+  return true;
+}
+
+bool PriorStrengths::weigh(const Hypothesis& best) {
+  const Variances own = variances(best);
   if (!evidence_.project(own, projections_.front(), works_.front()) ||
       !evidence_.profiles(projections_.front(), own, floors(), profiles_, works_.front())) {
     return false;
@@ -223,26 +261,27 @@ bool PriorStrengths::weigh(const PriorScaleValues& best) {
   return true;
 }
 
-void PriorStrengths::gather_neighbours(const Profiles& log_p, const PriorScaleValues& from,
+void PriorStrengths::gather_neighbours(const Profiles& log_p, const Hypothesis& from,
                                        double log_weight) {
   for (std::size_t part = 0; part < count_.size(); ++part) {
     if (!searched(part)) continue;
-    const std::size_t own = index_of(from[part]);
+    const std::size_t own = index_of(from.scales[part]);
     for (std::size_t i = 0; i < kStrengths.size(); ++i) {
       if (i == own) continue;
-      candidates_.push_back({from, log_weight + log_p[part][i] - log_p[part][own]});
+      candidates_.push_back(
+          {from.scales, log_weight + log_p[part][i] - log_p[part][own], from.error});
       candidates_.back().scales[part] = kStrengths[i];
     }
   }
 }
 
-bool PriorStrengths::gather_candidates(const PriorScaleValues& best) {
+bool PriorStrengths::gather_candidates(const Hypothesis& best) {
   // Of each part: what it becomes where two parts change.
   PerPart<std::size_t> other{};
   PerPart<char> done{};
   for (std::size_t part = 0; part < count_.size(); ++part) {
     const StrengthProfile& log_p = profiles_[part];
-    if (index_of(best[part]) > 0) continue;
+    if (index_of(best.scales[part]) > 0) continue;
     other[part] =
         static_cast<std::size_t>(std::max_element(log_p.begin() + 1, log_p.end()) - log_p.begin());
   }
@@ -250,10 +289,10 @@ bool PriorStrengths::gather_candidates(const PriorScaleValues& best) {
     const auto own = static_cast<std::size_t>(member);
     for (std::size_t part = own; part < count_.size(); part += works_.size()) {
       if (!searched(part)) continue;
-      PriorScaleValues changed = best;
-      changed[part] = kStrengths[other[part]];
+      Hypothesis changed = best;
+      changed.scales[part] = kStrengths[other[part]];
       const bool found = evidence_.changed_profiles(projections_.front(), variances(best), part,
-                                                    variance(part, changed), floors(),
+                                                    variance(part, changed.scales), floors(),
                                                     changed_profiles_[part], works_[own]);
       add_prior(changed_profiles_[part]);
       done[part] = found ? 1 : 0;
@@ -265,29 +304,62 @@ bool PriorStrengths::gather_candidates(const PriorScaleValues& best) {
   for (std::size_t part = 0; part < count_.size(); ++part) {
     if (!searched(part)) continue;
     if (!done[part]) return false;
-    PriorScaleValues changed = best;
-    changed[part] = kStrengths[other[part]];
+    Hypothesis changed = best;
+    changed.scales[part] = kStrengths[other[part]];
     gather_neighbours(changed_profiles_[part], changed,
-                      profiles_[part][other[part]] - profiles_[part][index_of(best[part])]);
+                      profiles_[part][other[part]] - profiles_[part][index_of(best.scales[part])]);
   }
+  if (evidence_.errors() > 1 && !gather_other_errors(best)) return false;
   // Two changes of one part may lead back.
-  std::erase_if(candidates_, [&](const Hypothesis& each) { return each.scales == best; });
+  std::erase_if(candidates_, [&](const Hypothesis& each) {
+    return each.scales == best.scales && each.error == best.error;
+  });
   return true;
 }
 
-void PriorStrengths::weigh_candidates(const PriorScaleValues& best) {
+bool PriorStrengths::gather_other_errors(const Hypothesis& best) {
+  std::array<char, kOutlineErrors.size()> done{};
+  auto profile = [&](int member) {
+    const auto own = static_cast<std::size_t>(member);
+    for (std::size_t e = own; e < static_cast<std::size_t>(evidence_.errors());
+         e += works_.size()) {
+      const Hypothesis changed{best.scales, 1.0, static_cast<int>(e)};
+      const Variances there = variances(changed);
+      done[e] = log_posterior(changed, works_[own], error_log_p_[e]) &&
+                        evidence_.project(there, projections_[own], works_[own]) &&
+                        evidence_.profiles(projections_[own], there, floors(), error_profiles_[e],
+                                           works_[own])
+                    ? 1
+                    : 0;
+      add_prior(error_profiles_[e]);
+    }
+  };
+  team_->run(profile);
+  for (int e = 0; e < evidence_.errors(); ++e) {
+    const auto at = static_cast<std::size_t>(e);
+    if (!done[at]) return false;
+    if (e == best.error) continue;
+    const double log_weight = error_log_p_[at] - error_log_p_[static_cast<std::size_t>(best.error)];
+    candidates_.push_back({best.scales, log_weight, e});
+    gather_neighbours(error_profiles_[at], {best.scales, 1.0, e}, log_weight);
+  }
+  return true;
+}
+
+void PriorStrengths::weigh_candidates(const Hypothesis& best) {
   std::sort(candidates_.begin(), candidates_.end(), [](const Hypothesis& a, const Hypothesis& b) {
-    return a.weight != b.weight ? a.weight > b.weight : a.scales < b.scales;
+    return std::tie(b.weight, a.error, a.scales) < std::tie(a.weight, b.error, b.scales);
   });
-  hypotheses_.assign(1, {best, 1.0});
+  hypotheses_.assign(1, {best.scales, 1.0, best.error});
   set_far(hypotheses_.front().scales);
   for (const Hypothesis& each : candidates_) {
     if (hypotheses_.size() >= kMaxHypotheses) break;
     // The same pair of changes may come in either order.
     const bool known =
-        std::any_of(hypotheses_.begin(), hypotheses_.end(),
-                    [&](const Hypothesis& other) { return other.scales == each.scales; });
-    if (!known) hypotheses_.push_back({each.scales, std::exp(each.weight)});
+        std::any_of(hypotheses_.begin(), hypotheses_.end(), [&](const Hypothesis& other) {
+          return other.scales == each.scales && other.error == each.error;
+        });
+    if (!known) hypotheses_.push_back({each.scales, std::exp(each.weight), each.error});
   }
   for (Hypothesis& each : hypotheses_) set_far(each.scales);
   const auto sum = [&] {
@@ -301,30 +373,33 @@ void PriorStrengths::weigh_candidates(const PriorScaleValues& best) {
   }
   const double kept = sum() / (1.0 - broad_weight_);
   for (Hypothesis& each : hypotheses_) each.weight /= kept;
-  if (broad_weight_ > 0.0) hypotheses_.push_back({broad(), broad_weight_});
+  if (broad_weight_ > 0.0) hypotheses_.push_back(broad());
 }
 
 bool PriorStrengths::climb() {
   for (int step = 0; step < kMaxSteps && gain() > kMinGain; ++step) {
-    PriorScaleValues next = candidates_.front().scales;
+    Hypothesis next = candidates_.front();
     if (!ascend(next, projections_.front(), works_.front()) || !weigh(next)) return false;
   }
   return true;
 }
 
-Status PriorStrengths::fit(const blas::In<double>& gram, const Eigen::Ref<const VecX>& right) {
-  if (!evidence_.take(gram, right)) return not_finite();
+Status PriorStrengths::fit(const blas::In<double>& gram, const Eigen::Ref<const VecX>& right,
+                           const Eigen::MatrixXd& common_variance) {
+  if (!evidence_.take(gram, right, common_variance)) return not_finite();
   if (!estimate_) return {};
-  PriorScaleValues best;
+  Hypothesis best;
   if (!search(best) || !weigh(best) || !climb()) keep_held();
   return {};
 }
 
 Result<bool> PriorStrengths::refit(const blas::In<double>& gram,
-                                   const Eigen::Ref<const VecX>& right, bool may_change) {
-  if (!evidence_.holds(gram, right)) {
-    const PriorScaleValues same = held();
-    if (!evidence_.take(gram, right)) return not_finite();
+                                   const Eigen::Ref<const VecX>& right, bool may_change,
+                                   const Eigen::MatrixXd& common_variance) {
+  if (!evidence_.holds(gram, right, common_variance)) {
+    if (!evidence_.take(gram, right, common_variance)) return not_finite();
+    hypotheses_.front().error = std::min(held_error(), evidence_.errors() - 1);
+    const Hypothesis same = hypotheses_.front();
     if (estimate_ && !weigh(same)) keep_held();
   }
   if (!estimate_ || !may_change || gain() <= kWorthwhile) return false;
@@ -334,7 +409,7 @@ Result<bool> PriorStrengths::refit(const blas::In<double>& gram,
 
 void PriorStrengths::keep_held() {
   candidates_.clear();
-  weigh_candidates(PriorScaleValues(held()));
+  weigh_candidates(Hypothesis(hypotheses_.front()));
 }
 
 template <typename Work>
@@ -357,7 +432,7 @@ bool PriorStrengths::mean_shift(Eigen::Ref<VecX> out) {
   auto mean = means_.col(hypotheses);
   mean.setZero();
   if (!for_each_hypothesis([&](Eigen::Index h, const Hypothesis& each, Workspace& work) {
-        return evidence_.mean(variances(each.scales), work, means_.col(h));
+        return evidence_.mean(variances(each), work, means_.col(h));
       })) {
     return false;
   }
@@ -377,7 +452,7 @@ bool PriorStrengths::covariance(blas::Out<double> factor) {
   if (!for_each_hypothesis([&](Eigen::Index h, const Hypothesis& each, Workspace& work) {
         const double root = std::sqrt(each.weight);
         auto x = explained_.middleRows(h * rank, rank);
-        if (!evidence_.explained(variances(each.scales), work, x)) return false;
+        if (!evidence_.explained(variances(each), work, x)) return false;
         x *= root;
         apart_.row(h) = root * (means_.col(h) - means_.col(hypotheses)).tail(r).transpose();
         return true;
@@ -404,7 +479,7 @@ bool PriorStrengths::covariance(blas::Out<double> factor) {
 }
 
 bool PriorStrengths::explained_broadly(linalg::GrowingMatrix& x, VecX& variances_of_modes) {
-  const PerPart<double> variances_of_parts = variances(broad());
+  const Variances variances_of_parts = variances(broad());
   variances_of_modes.resize(window_.count);
   for (int i = 0; i < window_.count; ++i) {
     variances_of_modes[i] = variances_of_parts[part_of_mode_[static_cast<std::size_t>(i)]];

@@ -7,17 +7,21 @@
 //
 //   p(s_g = 0) = kAbsent        p(s_g) ~ exp(-ln^2 s_g / (2 kLogStrengthSd^2)) for the others
 //
-// A *hypothesis* is one strength for every part. Its marginal likelihood p(d | s) is that of the
-// linear model of one contact set (strength_evidence.hpp).
+// How large the errors are that neighbours on an outline share, and over which length, is not known
+// either: e is one of kOutlineErrors, with p(e) of kNoOutlineError for none and alike for the others.
+//
+// A *hypothesis* is one strength for every part, and e. Its marginal likelihood p(d | s, e) is that
+// of the linear model of one contact set (strength_evidence.hpp).
 //
 // A part may have a *floor*: variance that it has besides, whatever its strength, because something
 // else acts through it that is never absent (the model's own error, condensed_inverter.hpp). s_g^2
 // then stands for s_g^2 + floor_g^2 everywhere below.
 //
 // The *neighbours* of a hypothesis differ from it in one part, or in two of which one vanishes or
-// enters: two families may explain the same data. fit() finds a hypothesis that is more probable
-// than its neighbours by coordinate ascent, best part first, from s = 0 and from s = 1, and takes
-// in the neighbours that have weight. Their weights are p(d | s) p(s), normalised (spike and slab:
+// enters: two families may explain the same data. Or they differ in e, and in one part or none: a
+// swelling that is not there explains an outline that is off. fit() finds a hypothesis that is more
+// probable than its neighbours by coordinate ascent, best part first, from s = 0 and from s = 1,
+// without errors of the outline and with the largest, and takes in the neighbours that have weight. Their weights are p(d | s) p(s), normalised (spike and slab:
 // Mitchell & Beauchamp 1988, JASA 83:1023; averaging: Hoeting et al. 1999, Stat. Sci. 14:382).
 // Estimate and covariance are those of the mixture:
 //
@@ -35,6 +39,7 @@
 // columns are needed than ever before.
 #pragma once
 
+#include <array>
 #include <cmath>
 #include <vector>
 
@@ -51,6 +56,7 @@
 namespace brainshift::inversion {
 
 inline constexpr double kAbsent = 0.5;
+inline constexpr double kNoOutlineError = 0.25;
 // ln 3: the case's strengths are right to a factor of 9 (two standard deviations).
 inline constexpr double kLogStrengthSd = 1.0986122886681098;
 
@@ -64,15 +70,16 @@ class PriorStrengths {
   PriorStrengths(const PerPart<int>& columns, ModeWindow window, int max_common, bool estimate,
                  double broad_weight, ThreadTeam& team);
 
-  // gram: G, lower triangle; right: b; the common errors come first. kNotFinite when G is not
-  // positive semidefinite or not finite.
-  Status fit(const linalg::blas::In<double>& gram, const Eigen::Ref<const VecX>& right);
+  // gram: G, lower triangle; right: b; the common errors come first, with their variances
+  // (SparseData::common_variance). kNotFinite when G is not positive semidefinite or not finite.
+  Status fit(const linalg::blas::In<double>& gram, const Eigen::Ref<const VecX>& right,
+             const Eigen::MatrixXd& common_variance = {});
   // The same for another linear model of the same data. The held hypothesis stays while no
   // neighbour is more probable by kWorthwhile: the data hardly tell such two apart, and a search
   // would wander between them. It stays in any case without may_change, for loads that are
   // its own and that nobody will descend from again. Whether it did not stay.
   Result<bool> refit(const linalg::blas::In<double>& gram, const Eigen::Ref<const VecX>& right,
-                     bool may_change);
+                     bool may_change, const Eigen::MatrixXd& common_variance = {});
   // Every strength as in the case, before the first fit(), and no floor.
   void reset();
   // In units of the case's standard deviation. Without effect where strengths are not estimated.
@@ -87,6 +94,7 @@ class PriorStrengths {
   const std::vector<Hypothesis>& hypotheses() const { return hypotheses_; }
   // Of the hypothesis that a descent is for: a most probable one.
   const PriorScaleValues& held() const { return hypotheses_.front().scales; }
+  int held_error() const { return hypotheses_.front().error; }
   // Of mode `mode` of the window under the held hypothesis, with its part's floor.
   double scale_of(int mode) const { return scale_of(mode, held()); }
   // The same under other strengths.
@@ -121,18 +129,19 @@ class PriorStrengths {
   // part; of the parts that the window has.
   using Profiles = PerPart<StrengthProfile>;
   void add_prior(Profiles& log_p) const;
-  bool log_posterior(const PriorScaleValues& scales, Workspace& work, double& out) const;
+  bool log_posterior(const Hypothesis& hypothesis, Workspace& work, double& out) const;
   double variance(std::size_t part, const PriorScaleValues& scales) const {
     return scales[part] * scales[part] + floor_[part] * floor_[part];
   }
-  PerPart<double> variances(const PriorScaleValues& scales) const;
+  Variances variances(const Hypothesis& hypothesis) const;
+  double log_prior_of_error(int error) const;
   PriorScaleValues as_in_the_case() const;
   // Whether the data choose the strength of a part.
   bool searched(std::size_t part) const {
     return count_[part] > 0 && part != static_cast<std::size_t>(PriorPart::kFar);
   }
   // What the data do not see, once they have said how strong the held hypothesis is.
-  PriorScaleValues broad() const;
+  Hypothesis broad() const;
   // The far part is as strong as the near fields that it goes on from, and not weaker than the
   // case.
   void set_far(PriorScaleValues& scales) const;
@@ -140,18 +149,22 @@ class PriorStrengths {
   PriorScaleValues absent_parts() const;
   PerPart<double> floors() const;
   // To the next maximum over one part at a time.
-  bool ascend(PriorScaleValues& scales, Projection& projection, Workspace& work) const;
-  bool search(PriorScaleValues& best);
-  bool weigh(const PriorScaleValues& best);
+  bool ascend(Hypothesis& hypothesis, Projection& projection, Workspace& work) const;
+  // To the most probable error for these strengths.
+  bool ascend_error(Hypothesis& hypothesis, Workspace& work) const;
+  bool search(Hypothesis& best);
+  bool weigh(const Hypothesis& best);
   // The held hypothesis alone, where rounding leaves no profile: an update is worth more than the
   // weights of its neighbours.
   void keep_held();
   // candidates_: those that differ from `from`, whose profiles are given, in one part. Their
   // weights are ln p, `log_weight` that of `from`.
-  void gather_neighbours(const Profiles& log_p, const PriorScaleValues& from, double log_weight);
+  void gather_neighbours(const Profiles& log_p, const Hypothesis& from, double log_weight);
   // Those of the hypothesis whose profiles_ are given.
-  bool gather_candidates(const PriorScaleValues& best);
-  void weigh_candidates(const PriorScaleValues& best);
+  bool gather_candidates(const Hypothesis& best);
+  // Of them, those that differ in the error.
+  bool gather_other_errors(const Hypothesis& best);
+  void weigh_candidates(const Hypothesis& best);
   // Of ln p, from the held hypothesis to the most probable neighbour; they have been weighed.
   double gain() const { return candidates_.empty() ? 0.0 : candidates_.front().weight; }
   // From the held hypothesis to one that is more probable than its neighbours.
@@ -174,7 +187,9 @@ class PriorStrengths {
   PriorScaleValues floor_{};
   StrengthProfile log_prior_{};
   Profiles profiles_{};
-  PerPart<Profiles> changed_profiles_{};  // with that part changed
+  PerPart<Profiles> changed_profiles_{};                          // with that part changed
+  std::array<Profiles, kOutlineErrors.size()> error_profiles_{};  // with that error
+  std::array<double, kOutlineErrors.size()> error_log_p_{};
 
   linalg::GrowingMatrix means_;      // (c, z) by hypothesis, then their mean
   linalg::GrowingMatrix explained_;  // of every hypothesis, one below the other

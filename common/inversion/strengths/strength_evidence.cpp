@@ -26,21 +26,26 @@ StrengthEvidence::StrengthEvidence(const PerPart<int>& counts, int max_common)
   }
 }
 
-bool StrengthEvidence::holds(const blas::In<double>& gram,
-                             const Eigen::Ref<const VecX>& right) const {
-  if (gram.rows() != size_ || right != right_) return false;
+bool StrengthEvidence::holds(const blas::In<double>& gram, const Eigen::Ref<const VecX>& right,
+                             const Eigen::MatrixXd& common_variance) const {
+  if (gram.rows() != size_ || right != right_ ||
+      common_variance.cols() != common_variance_.cols() || common_variance != common_variance_) {
+    return false;
+  }
   for (Eigen::Index j = 0; j < size_; ++j) {
     if (gram.col(j).tail(size_ - j) != gram_.col(j).tail(size_ - j)) return false;
   }
   return true;
 }
 
-bool StrengthEvidence::take(const blas::In<double>& gram, const Eigen::Ref<const VecX>& right) {
+bool StrengthEvidence::take(const blas::In<double>& gram, const Eigen::Ref<const VecX>& right,
+                            const Eigen::MatrixXd& common_variance) {
   size_ = gram.rows();
   common_ = size_ - modes_;
   if (!gram.diagonal().allFinite() || !right.allFinite()) return false;
   gram_ = gram;
   right_ = right;
+  common_variance_ = common_variance;
   if (left_.rows() < size_) {
     left_.resize(max_common_ + modes_, max_common_ + modes_);
     row_.resize(left_.cols());
@@ -51,14 +56,20 @@ bool StrengthEvidence::take(const blas::In<double>& gram, const Eigen::Ref<const
     const Eigen::Index row = pivots_[static_cast<std::size_t>(k)];
     y_[k] = (right[row] - left_.row(row).head(k).dot(y_.head(k))) / left_(row, k);
   }
-  const auto square = [&](Eigen::Index first, Eigen::Index count, linalg::GrowingMatrix& out) {
+  const auto square = [&](const auto& rows, linalg::GrowingMatrix& out) {
     out.resize(rank_, rank_);
     out.setZero();
-    if (count > 0 && rank_ > 0) blas::gram(left_.block(first, 0, count, rank_), 0.0, out);
+    if (rows.rows() > 0 && rank_ > 0) blas::gram(rows, 0.0, out);
   };
-  square(0, common_, of_common_);
+  for (int e = 0; e < errors(); ++e) {
+    scaled_ = left_.topLeftCorner(common_, rank_);
+    if (common_variance_.cols() > 0) {
+      scaled_.array().colwise() *= common_variance_.col(e).array().sqrt();
+    }
+    square(scaled_, of_common_[static_cast<std::size_t>(e)]);
+  }
   for (std::size_t part = 0; part < count_.size(); ++part) {
-    square(common_ + first_[part], count_[part], of_part_[part]);
+    square(left_.block(common_ + first_[part], 0, count_[part], rank_), of_part_[part]);
   }
   factorise_parts();
   return y_.allFinite();
@@ -127,12 +138,11 @@ void StrengthEvidence::factorise_parts() {
   roots_in_all_ = first;
 }
 
-bool StrengthEvidence::fill_omega(const PerPart<double>& variances,
-                                  linalg::GrowingMatrix& omega) const {
+bool StrengthEvidence::fill_omega(const Variances& variances, linalg::GrowingMatrix& omega) const {
   omega.resize(rank_, rank_);
   for (Eigen::Index j = 0; j < rank_; ++j) {
     auto column = omega.col(j).tail(rank_ - j);
-    column = of_common_.col(j).tail(rank_ - j);
+    column = of_common_[static_cast<std::size_t>(variances.error)].col(j).tail(rank_ - j);
     column[0] += 1.0;
     for (std::size_t part = 0; part < count_.size(); ++part) {
       if (count_[part] == 0 || variances[part] == 0.0) continue;
@@ -142,7 +152,7 @@ bool StrengthEvidence::fill_omega(const PerPart<double>& variances,
   return rank_ == 0 || blas::cholesky(omega);
 }
 
-bool StrengthEvidence::log_evidence(const PerPart<double>& variances, Workspace& work,
+bool StrengthEvidence::log_evidence(const Variances& variances, Workspace& work,
                                     double& out) const {
   if (!fill_omega(variances, work.omega)) return false;
   work.whitened = y_;
@@ -152,8 +162,7 @@ bool StrengthEvidence::log_evidence(const PerPart<double>& variances, Workspace&
   return std::isfinite(out);
 }
 
-bool StrengthEvidence::project(const PerPart<double>& variances, Projection& out,
-                               Workspace& work) const {
+bool StrengthEvidence::project(const Variances& variances, Projection& out, Workspace& work) const {
   if (!fill_omega(variances, work.omega)) return false;
   const Eigen::Index columns = roots_in_all_;
   out.whitened_parts = roots_.topLeftCorner(rank_, columns);
@@ -168,7 +177,7 @@ bool StrengthEvidence::project(const PerPart<double>& variances, Projection& out
   return true;
 }
 
-bool StrengthEvidence::profiles(const Projection& projection, const PerPart<double>& variances,
+bool StrengthEvidence::profiles(const Projection& projection, const Variances& variances,
                                 const PerPart<double>& floors, PerPart<StrengthProfile>& out,
                                 Workspace& work) const {
   for (std::size_t part = 0; part < count_.size(); ++part) {
@@ -182,9 +191,9 @@ bool StrengthEvidence::profiles(const Projection& projection, const PerPart<doub
 }
 
 // With G G^T = I + delta C_gg and Y = G^-1 C_g: C - delta Y^T Y.
-bool StrengthEvidence::changed_profiles(const Projection& projection,
-                                        const PerPart<double>& variances, std::size_t part,
-                                        double variance, const PerPart<double>& floors,
+bool StrengthEvidence::changed_profiles(const Projection& projection, const Variances& variances,
+                                        std::size_t part, double variance,
+                                        const PerPart<double>& floors,
                                         PerPart<StrengthProfile>& out, Workspace& work) const {
   const Eigen::Index changed = first_root_[part], size = root_count_[part];
   const double delta = variance - variances[part];
@@ -273,7 +282,7 @@ bool StrengthEvidence::profile(double variance, double floor, StrengthProfile& o
   return true;
 }
 
-bool StrengthEvidence::mean(const PerPart<double>& variances, Workspace& work,
+bool StrengthEvidence::mean(const Variances& variances, Workspace& work,
                             Eigen::Ref<VecX> out) const {
   if (!fill_omega(variances, work.omega)) return false;
   work.whitened = y_;
@@ -281,6 +290,9 @@ bool StrengthEvidence::mean(const PerPart<double>& variances, Workspace& work,
   work.omega.triangularView<Eigen::Lower>().transpose().solveInPlace(work.whitened);
   // S^2 L Omega^-1 y
   out.noalias() = left_.topLeftCorner(size_, rank_) * work.whitened;
+  if (common_variance_.cols() > 0) {
+    out.head(common_).array() *= common_variance_.col(variances.error).array();
+  }
   for (std::size_t part = 0; part < count_.size(); ++part) {
     out.segment(common_ + first_[part], count_[part]) *= variances[part];
   }
@@ -288,7 +300,7 @@ bool StrengthEvidence::mean(const PerPart<double>& variances, Workspace& work,
 }
 
 // K^-1 L_z^T S^2
-bool StrengthEvidence::explained(const PerPart<double>& variances, Workspace& work,
+bool StrengthEvidence::explained(const Variances& variances, Workspace& work,
                                  blas::Out<double> out) const {
   if (!fill_omega(variances, work.omega)) return false;
   out = left_.block(common_, 0, modes_, rank_).transpose();

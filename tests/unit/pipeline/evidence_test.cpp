@@ -270,7 +270,20 @@ TEST_F(Sources, ATumourBoundaryIsMeasuredAnewForTheEstimate) {
     EXPECT_NEAR(data.directions.col(i).dot(data.displacements.col(i)), -data.directions(2, i),
                 1e-9);
   }
-  EXPECT_EQ(data.common_error.cols(), 6);  // the probe's pose
+  // The probe's pose, whose size is known, and what neighbours on the outline are off by alike.
+  ASSERT_GT(data.common_error.cols(), 6);
+  ASSERT_EQ(data.common_variance.rows(), data.common_error.cols());
+  EXPECT_TRUE(data.common_variance.topRows(6).isOnes(0.0));
+  EXPECT_TRUE(data.common_variance.bottomRows(1).leftCols(1).isZero(0.0)) << "none";
+  for (int i = 0; i < data.size(); ++i) {  // along the normal
+    const auto own = data.common_error.middleRows<3>(3 * i).rightCols(1);
+    EXPECT_NEAR(own.norm(), std::abs(data.directions.col(i).dot(own.col(0))), 1e-12);
+  }
+  config_.sensing.boundary_outline_errors = false;
+  pipeline_ = pipeline(Method::kCondensed);
+  ASSERT_TRUE(run(boundary(1, 0, Vec3(0, 0, -1))));
+  EXPECT_EQ(inversion_.seen.common_error.cols(), 6);
+  EXPECT_EQ(inversion_.seen.common_variance.size(), 0);
 }
 
 // The noise of neighbours is averaged. What the alignment leaves differs among them, so that an

@@ -58,5 +58,23 @@ TEST(CombinedSparseData, OfNothingIsEmpty) {
   EXPECT_EQ(combine({part(0, 1.0, 0)}).size(), 0);
 }
 
+// Errors whose size is known have variance 1 beside those whose size is not.
+TEST(CombinedData, KeepTheVarianceOfEveryCommonError) {
+  SparseData outlined = part(2, 1.0, 2);
+  outlined.common_variance = Eigen::MatrixXd::Constant(2, kOutlineErrors.size(), 0.25);
+  const SparseData all = combine({part(3, 2.0, 1), outlined, part(2, 3.0, 0)});
+  ASSERT_EQ(all.common_variance.rows(), 3);
+  ASSERT_EQ(all.common_variance.cols(), static_cast<Eigen::Index>(kOutlineErrors.size()));
+  EXPECT_TRUE(all.common_variance.row(0).isOnes(0.0));
+  EXPECT_TRUE(all.common_variance.bottomRows(2).isConstant(0.25));
+  EXPECT_EQ(combine({part(3, 2.0, 1)}).common_variance.cols(), 0);
+  SparseData small = part(2, 1.0, 1);  // of the shorter length alone
+  small.common_variance.resize(1, 4);
+  small.common_variance << 0.0, 0.1, 0.2, 0.3;
+  const Eigen::MatrixXd both = combine({outlined, small}).common_variance;
+  ASSERT_EQ(both.cols(), 7);
+  EXPECT_EQ(both.row(2), (Eigen::RowVectorXd(7) << 0.0, 0.1, 0.2, 0.3, 0.1, 0.2, 0.3).finished());
+}
+
 }  // namespace
 }  // namespace brainshift

@@ -88,6 +88,19 @@ TEST(CheckData, RefusesCountsThatDiffer) {
   expect_refused(data, ErrorCode::kInvalidArgument, "4 positions, 4 displacements and 3 standard");
 }
 
+TEST(CheckData, RefusesVariancesOfCommonErrorsThatDoNotFit) {
+  SparseData data = good_data();
+  data.common_error = Eigen::MatrixXd::Ones(3 * data.size(), 2);
+  data.common_variance = Eigen::MatrixXd::Constant(2, kOutlineErrors.size(), 0.5);
+  EXPECT_TRUE(check_data(data).has_value());
+  data.common_variance(1, 3) = 1.5;
+  expect_refused(data, ErrorCode::kInvalidArgument, "common_variance holds a value outside 0 to 1");
+  data.common_variance = Eigen::MatrixXd::Ones(3, 4);
+  expect_refused(data, ErrorCode::kInvalidArgument, "common_variance is 3 x 4: must have 2 rows");
+  data.common_variance = Eigen::MatrixXd::Ones(2, 8);
+  expect_refused(data, ErrorCode::kInvalidArgument, "and at most 7 columns");
+}
+
 TEST(CheckData, NamesTheDatumThatIsNotFinite) {
   for (double bad :
        {std::numeric_limits<double>::quiet_NaN(), std::numeric_limits<double>::infinity()}) {

@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <set>
 
 #include "common/core/random.hpp"
 #include "tests/support/dense.hpp"
@@ -349,6 +350,126 @@ TEST(PriorStrengths, WhatIsExplainedBroadlyIsWhatTheDataTookAway) {
   found.diagonal() += variances;
   EXPECT_LT((found - covariance.bottomRightCorner(kModes, kModes)).norm(),
             1e-4 * covariance.norm());
+}
+
+// Points on a line of 40 mm: a smooth load moves them, and their outline is off by a smooth error of
+// another length. Columns of the error: a full factor of its covariance for 5 mm, with the variances
+// that make the other hypotheses of it (registration/outline_errors.hpp does this for any points).
+struct Outline {
+  static constexpr int kPoints = 120, kErrors = 24;
+  Outline() : columns(kPoints, kErrors), variance(kErrors, kOutlineErrors.size()) {
+    // Cosines along the line are nearly the eigenvectors of every such covariance.
+    constexpr double kLength_mm = 40.0;
+    for (int k = 0; k < kErrors; ++k) {
+      const double wave = M_PI * k / kLength_mm;
+      const auto spectrum = [&](double length_mm) {
+        return (k == 0 ? 1.0 : 2.0) * std::sqrt(2.0 * M_PI) * length_mm / (2.0 * kLength_mm) *
+               std::exp(-0.5 * std::pow(wave * length_mm, 2));
+      };
+      const double most = std::max(spectrum(5.0), spectrum(10.0));
+      for (int i = 0; i < kPoints; ++i) {
+        columns(i, k) = 0.5 * std::sqrt(most) * std::cos(wave * kLength_mm * (i + 0.5) / kPoints);
+      }
+      for (std::size_t e = 0; e < kOutlineErrors.size(); ++e) {
+        variance(k, static_cast<Eigen::Index>(e)) = std::pow(kOutlineErrors[e].sd_mm / 0.5, 2) *
+                                                    spectrum(kOutlineErrors[e].length_mm) / most;
+      }
+    }
+  }
+  // Data of noise `sd_mm` and an error of hypothesis `e`; loads: a swelling of 8 modes, smooth over
+  // a third of the line, part 2. Whitened by sd_mm.
+  Problem drawn(int e, double swelling_mm, std::uint64_t seed) const {
+    constexpr double kSd_mm = 0.2;
+    Random random(seed);
+    MatrixXd loads = MatrixXd::Zero(kPoints, kModes);
+    for (int k = 0; k < 8; ++k) {
+      for (int i = 0; i < kPoints; ++i) {
+        loads(i, 6 + k) = std::exp(-0.5 * std::pow((40.0 * i / kPoints - 5.0 * k) / 6.0, 2));
+      }
+    }
+    VecX truth(kErrors), amplitudes(8);
+    for (double& value : truth) value = random.normal();
+    for (double& value : amplitudes) value = swelling_mm * random.normal();
+    VecX data = columns * (variance.col(e).cwiseSqrt().asDiagonal() * truth) +
+                loads.middleCols(6, 8) * amplitudes;
+    for (double& value : data) value += kSd_mm * random.normal();
+    Problem problem{MatrixXd(kPoints, kErrors + kModes), data / kSd_mm};
+    problem.jacobian << columns / kSd_mm, loads / kSd_mm;
+    return problem;
+  }
+  MatrixXd columns, variance;
+};
+
+PriorStrengths fitted_with_errors(const Problem& problem, const MatrixXd& variance) {
+  PriorStrengths result(kColumns, kWindow, Outline::kErrors, true, 0.0, team());
+  EXPECT_TRUE(result.fit(problem.gram(), problem.right(), variance));
+  return result;
+}
+
+// An outline that is off by half a millimetre over ten looks like swelling to errors that are
+// independent, and not to errors that neighbours share.
+TEST(PriorStrengths, AnOutlineThatIsOffIsNoSwelling) {
+  const Outline outline;
+  int independent = 0, shared = 0, missed = 0;
+  constexpr int kDraws = 20;
+  const auto evidence_of_swelling = [](const PriorStrengths& fit) {
+    const double absent = fit.absent()[2];
+    return std::log(std::max(1e-9, 1.0 - absent) / std::max(1e-9, absent)) > 1.0;
+  };
+  for (std::uint64_t seed = 1; seed <= kDraws; ++seed) {
+    const Problem off = outline.drawn(6, 0.0, seed);
+    Problem alone = off;
+    alone.jacobian.leftCols(Outline::kErrors).setZero();
+    independent += evidence_of_swelling(fitted_with_errors(alone, outline.variance));
+    shared += evidence_of_swelling(fitted_with_errors(off, outline.variance));
+    missed +=
+        !evidence_of_swelling(fitted_with_errors(outline.drawn(0, 3.0, seed), outline.variance));
+  }
+  EXPECT_GT(independent, kDraws * 9 / 10) << "the test shows nothing";
+  EXPECT_LE(shared, kDraws / 10);
+  EXPECT_LE(missed, kDraws / 20) << "of swellings that are there";
+}
+
+TEST(PriorStrengths, ErrorHypothesesAreWeighedByTheirProbability) {
+  const Outline outline;
+  const Problem problem = outline.drawn(2, 1.0, 5);
+  const PriorStrengths result = fitted_with_errors(problem, outline.variance);
+  const auto log_p = [&](const Hypothesis& each) {
+    Problem scaled = problem;
+    MatrixXd covariance = MatrixXd::Identity(Outline::kPoints, Outline::kPoints);
+    const auto errors = problem.jacobian.leftCols(Outline::kErrors);
+    covariance += errors * outline.variance.col(each.error).asDiagonal() * errors.transpose();
+    const auto loads = problem.jacobian.rightCols(kModes);
+    covariance +=
+        loads * prior_sd(each.scales).tail(kModes).cwiseAbs2().asDiagonal() * loads.transpose();
+    double log_prior = std::log(
+        each.error == 0 ? kNoOutlineError
+                        : (1.0 - kNoOutlineError) / static_cast<double>(kOutlineErrors.size() - 1));
+    double sum = 0.0;
+    for (std::size_t i = 1; i < kStrengths.size(); ++i) {
+      sum += std::exp(-0.5 * std::pow(std::log(kStrengths[i]) / std::log(3.0), 2));
+    }
+    for (const std::size_t g : kPresent) {
+      const double s = each.scales[g];
+      log_prior += s == 0.0 ? std::log(0.5)
+                            : std::log(0.5 / sum) - 0.5 * std::pow(std::log(s) / std::log(3.0), 2);
+    }
+    return log_prior -
+           0.5 * problem.data.dot(test_support::solve_positive(covariance, problem.data).col(0)) -
+           test_support::cholesky_factor(covariance).diagonal().array().log().sum();
+  };
+  const auto& hypotheses = result.hypotheses();
+  ASSERT_GE(hypotheses.size(), 5u);
+  std::set<int> errors;
+  for (const Hypothesis& each : hypotheses) {
+    errors.insert(each.error);
+    EXPECT_NEAR(each.weight / hypotheses[0].weight, std::exp(log_p(each) - log_p(hypotheses[0])),
+                0.02);
+  }
+  EXPECT_GE(errors.size(), 2u);
+  for (int e = 0; e < static_cast<int>(kOutlineErrors.size()); ++e) {  // no single change is better
+    EXPECT_LE(log_p({hypotheses[0].scales, 1.0, e}), log_p(hypotheses[0]) + 1e-2) << e;
+  }
 }
 
 TEST(PriorStrengths, NumbersThatAreNotFiniteAreRejected) {

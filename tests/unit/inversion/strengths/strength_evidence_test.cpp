@@ -139,6 +139,38 @@ TEST_F(StrengthEvidenceTest, MomentsAreThoseOfTheLinearModel) {
   EXPECT_LT((left - covariance.bottomRightCorner(kLoads, kLoads)).cwiseAbs().maxCoeff(), 1e-2);
 }
 
+// Common errors whose variances are a hypothesis: as if their columns were multiplied by its roots.
+TEST_F(StrengthEvidenceTest, AnErrorHypothesisIsThatOfScaledColumns) {
+  MatrixXd variance(kShared, 3);
+  variance << 1.0, 0.25, 0.0,  //
+      0.0, 0.09, 1.0;
+  ASSERT_TRUE(evidence.take(model.gram(), model.right(), variance));
+  ASSERT_EQ(evidence.errors(), 3);
+  double at_first = 0.0;
+  ASSERT_TRUE(evidence.log_evidence({of(1.0, 0.25, 4.0), 0}, work, at_first));
+  Model first = model;
+  first.jacobian.leftCols(kShared) *= variance.col(0).cwiseSqrt().asDiagonal();
+  for (int e = 0; e < 3; ++e) {
+    Model scaled = model;
+    const VecX roots = variance.col(e).cwiseSqrt();
+    scaled.jacobian.leftCols(kShared) *= roots.asDiagonal();
+    double found = 0.0;
+    ASSERT_TRUE(evidence.log_evidence({of(16.0, 0.0, 1.0), e}, work, found));
+    EXPECT_NEAR(found - at_first,
+                log_evidence(scaled, of(16.0, 0.0, 1.0)) - log_evidence(first, of(1.0, 0.25, 4.0)),
+                kLeftOut);
+    MatrixXd precision = scaled.gram();
+    precision.diagonal() += prior_variance(of(16.0, 0.0625, 1.0)).cwiseInverse();
+    VecX expected = test_support::solve_positive(precision, scaled.right()).col(0);
+    expected.head(kShared).array() *= roots.array();
+    VecX mean(kShared + kLoads);
+    ASSERT_TRUE(evidence.mean({of(16.0, 0.0625, 1.0), e}, work, mean));
+    EXPECT_LT((mean - expected).norm(), 1e-2 * expected.norm());
+  }
+  EXPECT_TRUE(evidence.holds(model.gram(), model.right(), variance));
+  EXPECT_FALSE(evidence.holds(model.gram(), model.right()));
+}
+
 TEST_F(StrengthEvidenceTest, HoldsOnlyWhatItWasGiven) {
   const MatrixXd gram = model.gram();
   VecX right = model.right();
