@@ -125,13 +125,13 @@ Status CondensedInverter::Impl::finish(Estimate& estimate) {
   const PriorStrengths& strengths = loads.strengths();
   record();  // of the mean over the hypotheses
   const Stopwatch rebuilding;
-  const double misfit_ratio = descent.posterior().misfit_ratio();
+  const auto misfit = loads.descent().posterior().misfit();
   if (options.uncertainty) {
     const StageClock clock(profile, UpdateStage::kDeviation);
     rebuild.standard_deviation(team, descent.reduction(), descent.covariance_factor(),
                                loads.remainder_variances(), estimate.sd_mm);
-    // Where data lie farther off than their standard deviations, so may the estimate (Birge 1932).
-    if (misfit_ratio > 1.0) estimate.sd_mm *= misfit_ratio;
+    // Where data lie farther off than chance explains, so may the estimate (Birge 1932).
+    if (misfit.ratio > misfit.by_chance) estimate.sd_mm *= misfit.ratio;
     if (!loads.strengths().explained_broadly(explained, prior_variances)) {
       return fail(ErrorCode::kNotFinite, "inversion: the broad hypothesis is not finite");
     }
@@ -179,7 +179,7 @@ Status CondensedInverter::Impl::finish(Estimate& estimate) {
   estimate.hypotheses = strengths.hypotheses();
   std::sort(estimate.hypotheses.begin(), estimate.hypotheses.end(),
             [](const Hypothesis& a, const Hypothesis& b) { return a.weight > b.weight; });
-  estimate.misfit_ratio = misfit_ratio;
+  estimate.misfit_ratio = misfit.ratio;
   estimate.data_outside_region = loads.sampled().data_outside_region();
   summarise_sources(estimate);
   return {};

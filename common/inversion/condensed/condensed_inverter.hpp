@@ -21,7 +21,7 @@
 // An estimate depends on its data alone, not on earlier updates.
 //
 // The standard deviation is that of the model above, times the ratio of the misfit to the one
-// expected where that is above 1. The reason names a ratio above 1.5.
+// expected where that is above what chance explains. The reason names a ratio above 1.5.
 //
 // Reproducible: the same data give the same bits for one build, type of machine and BLAS kernel.
 // Another region of interest moves a node that is rebuilt either way by less than 1e-9 mm. Another

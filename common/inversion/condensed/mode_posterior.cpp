@@ -73,6 +73,7 @@ ModePosterior::ModePosterior(ModeWindow window) : window_(window) {
   full_.setZero(most);
   precision_.setZero(most);
   z_.setZero(window.count);
+  inverse_.resize(most, most);
 }
 
 void ModePosterior::reserve(int data) {
@@ -199,7 +200,18 @@ void ModePosterior::set_answer(const Eigen::Ref<const VecX>& change_of_common, c
 void ModePosterior::update_residual() {
   residual_.head(rows_) = jacobian_.col(unknowns()).head(rows_);
   residual_.head(rows_).noalias() -= jacobian() * solution_.head(unknowns());
-  misfit_ratio_ = std::sqrt(residual_.head(rows_).squaredNorm() / static_cast<double>(rows_));
+}
+
+// With L L^T = I + S G S: k = size - tr (I + S G S)^-1 = size - |L^-1|^2.
+ModePosterior::Misfit ModePosterior::misfit() {
+  const Eigen::Index size = unknowns();
+  auto inverse = inverse_.topLeftCorner(size, size);
+  inverse.setIdentity();
+  blas::solve_lower(factor(), inverse);
+  const double k = static_cast<double>(size) - inverse.squaredNorm();
+  const double n = static_cast<double>(rows_) - k;
+  return {std::sqrt(residual_.head(rows_).squaredNorm() / n),
+          std::sqrt(1.0 + 2.0 * std::sqrt(2.0 / n))};
 }
 
 void ModePosterior::solve_normal(Eigen::MatrixXd& x) const {

@@ -102,8 +102,14 @@ class ModePosterior {
 
   // d - A u - common error, whitened, rows.
   auto residual() const { return residual_.head(rows_); }
-  // Its root mean square: 1 when the data lie as far off as their standard deviations say.
-  double misfit_ratio() const { return misfit_ratio_; }
+  // ratio: sqrt(|residual|^2 / n), n = rows - k; k = tr(G Cov(c, z)) of the last minimise() counts the
+  // unknowns that the data decide. Where the model holds |residual|^2 has the mean n, so that 1 says
+  // that the data lie as far off as their standard deviations say. by_chance: the ratio of a
+  // chi-square of n degrees of freedom two standard deviations above its mean.
+  struct Misfit {
+    double ratio = 0.0, by_chance = 1.0;
+  };
+  Misfit misfit();
   // |d - A u| of one datum, whitened: with what is put down to the common error.
   double misfit(const SampledOperators& sampled, int datum) const;
   // |d - A u - common error| of one datum, whitened.
@@ -133,7 +139,7 @@ class ModePosterior {
   VecX scales_;  // V^1/2 for c, s for z
   linalg::GrowingMatrix common_variance_;
   mutable VecX full_;
-  double misfit_ratio_ = 0.0;
+  Eigen::MatrixXd inverse_;
   SourceCheck check_;
   Eigen::MatrixXd own_gram_;
   VecX own_right_, precision_;

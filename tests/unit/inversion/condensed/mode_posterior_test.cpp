@@ -123,6 +123,48 @@ TEST_F(ModePosteriorTest, ALinearModelThatFollowsTheSetBeforeIsThatOfItsOwn) {
   EXPECT_GT(followed, 8) << "the test shows nothing";
 }
 
+// Few data and many modes: the residual of data that the model explains is much smaller than their
+// errors, and the ratio is 1 on average all the same.
+TEST_F(ModePosteriorTest, TheMisfitRatioOfDataThatTheModelExplainsIsOne) {
+  const auto brain = operators(Boundary::kFixed);
+  const ModeWindow window{0, brain->num_modes()};
+  ThreadTeam team(1);
+  const auto locator = std::make_shared<const geometry::TetLocator>(patient()->mesh);
+  ContactSystem system(*brain, window, 1.0, team);
+  ContactReduction no_contact(*brain, window, system, team);
+  SparseData data = sagging_data(Boundary::kFixed, 0.3, 4);
+  data.sd_mm *= 0.02;
+  SampledOperators sampled(brain, locator, window, OutsideRegion::kExtend, team);
+  sampled.reserve(data.size());
+  ASSERT_TRUE(sampled.locate(data));
+  sampled.sample(data, RemainderVariances::Zero(), VecX::Ones(data.size()));
+  const Eigen::MatrixXd modes = sampled.free_body().leftCols(window.count);
+  const PriorStrengths strengths(brain->part_columns, window, SparseData::kMaxCommonErrors, false,
+                                 0.0, team);
+  ModePosterior posterior(window);
+  posterior.reserve(data.size());
+  Random random(3);
+  double squares = 0.0, of_rows = 0.0;
+  constexpr int kDraws = 100;
+  for (int draw = 0; draw < kDraws; ++draw) {
+    VecX z(window.count);
+    for (int i = 0; i < window.count; ++i) z[i] = strengths.scale_of(i) * random.normal();
+    const VecX moved = modes * z;
+    for (int i = 0; i < data.size(); ++i) {
+      for (int axis = 0; axis < 3; ++axis) {
+        data.displacements(axis, i) = sampled.sd(i) * (moved[3 * i + axis] + random.normal());
+      }
+    }
+    sampled.sample(data, RemainderVariances::Zero(), VecX::Ones(data.size()));
+    posterior.linearise(sampled, no_contact, false, team);
+    ASSERT_TRUE(posterior.minimise(strengths));
+    squares += std::pow(posterior.misfit().ratio, 2) / kDraws;
+    of_rows += posterior.residual().squaredNorm() / (kDraws * static_cast<double>(sampled.rows()));
+  }
+  EXPECT_LT(of_rows, 0.8) << "the test shows nothing";
+  EXPECT_NEAR(squares, 1.0, 0.1);
+}
+
 using Eigen::MatrixXd;
 
 constexpr int kUnknowns = 30, kFirst = 80, kSecond = 60;
