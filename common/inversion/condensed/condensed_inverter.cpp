@@ -92,9 +92,7 @@ DescentLimits CondensedInverter::Impl::limits(const InversionOptions& asked) {
   DescentLimits limits;
   limits.max_steps = condensed.max_contact_iterations;
   limits.stop = asked.stop;
-  limits.out_of_time = [this, &asked] {
-    return asked.stop.stop_requested() || watch.milliseconds() > condensed.deadline_ms;
-  };
+  limits.out_of_time = [this] { return watch.milliseconds() > condensed.deadline_ms; };
   limits.on_step = [this] { record(); };
   return limits;
 }

@@ -28,16 +28,6 @@ constexpr double kFar = 1.0;
 // Steps from afar that are shorter than this zigzag across an edge.
 constexpr double kShort = 0.1;
 
-// What a step is that was left because time is over, or because it failed.
-Result<EstimateStatus> left(const DescentLimits& limits, int step) {
-  if (limits.stop.stop_requested()) return stopped(step);
-  return EstimateStatus::kDeadline;
-}
-Result<EstimateStatus> left(const DescentLimits& limits, int step, const Error& error) {
-  if (!limits.out_of_time()) return tl::unexpected(error);
-  return left(limits, step);
-}
-
 }  // namespace
 
 LoadDescent::LoadDescent(const CondensedOperators& operators, ModeWindow window, double beta,
@@ -139,21 +129,21 @@ Status LoadDescent::newton_step(SampledOperators& sampled, const PriorStrengths&
   return {};
 }
 
-Status LoadDescent::solve_contact(const VecX& z, const std::function<bool()>& over) {
+Status LoadDescent::solve_contact(const VecX& z) {
   const StageClock clock(profile_, UpdateStage::kContact);
   auto forces = predicted_.head(reduction_.size());
   reduction_.forces_at(z, forces);
   contact_.begin_from(reduction_.active(), forces);
   contact_at_z_ = false;
-  return contact_.solve(z, over);
+  return contact_.solve(z);
 }
 
-Status LoadDescent::return_contact(const std::function<bool()>& over) {
+Status LoadDescent::return_contact() {
   if (contact_at_z_) return {};
   if (contact_kept_) {
     contact_.return_to_kept();
   } else {
-    if (auto status = solve_contact(z_, over); !status) return status;
+    if (auto status = solve_contact(z_); !status) return status;
     contact_.keep();
   }
   contact_at_z_ = contact_kept_ = true;
@@ -191,22 +181,12 @@ bool LoadDescent::far_from_model() const {
   return changes > std::max(6, reduction_.size() / 20);
 }
 
-Result<EstimateStatus> LoadDescent::jump(SampledOperators& sampled, const PriorStrengths& strengths,
-                                         const DescentLimits& limits) {
-  if (auto status = minimise(strengths); !status) return tl::unexpected(status.error());
-  trial_ = z_;
-  const bool kept = contact_kept_;
+Status LoadDescent::jump(SampledOperators& sampled, const PriorStrengths& strengths) {
+  if (auto status = minimise(strengths); !status) return status;
   z_ = posterior_.z();
   contact_at_z_ = contact_kept_ = false;
-  if (auto status = return_contact(kept ? limits.out_of_time : nullptr); !status) {
-    z_ = trial_;
-    contact_kept_ = kept;
-    return left(limits, 1, status.error());
-  }
-  if (contact_.set() != reduction_.set()) {
-    if (auto status = linearise(sampled); !status) return tl::unexpected(status.error());
-  }
-  return EstimateStatus::kConverged;
+  if (auto status = return_contact(); !status) return status;
+  return contact_.set() == reduction_.set() ? Status{} : linearise(sampled);
 }
 
 Status LoadDescent::take(SampledOperators& sampled) {
@@ -224,10 +204,10 @@ Status LoadDescent::begin(SampledOperators& sampled, const PriorStrengths& stren
 }
 
 Status LoadDescent::attempt(SampledOperators& sampled, const PriorStrengths& strengths,
-                            const VecX& whitened, const DescentLimits& limits) {
+                            const VecX& whitened) {
   posterior_.unwhiten(whitened, step_);
   trial_ = z_ + step_;
-  if (auto status = solve_contact(trial_, limits.out_of_time); !status) return status;
+  if (auto status = solve_contact(trial_); !status) return status;
   after_ = objective(sampled, strengths, trial_);
   return newton_step(sampled, strengths);
 }
@@ -271,9 +251,7 @@ Result<EstimateStatus> LoadDescent::descend_smoothly(SampledOperators& sampled,
       length = longest = reach(penetration_, most);
     }
     change_ = length * direction_;
-    if (auto ok = attempt(sampled, strengths, change_, limits); !ok) {
-      return left(limits, step + 1, ok.error());
-    }
+    if (auto ok = attempt(sampled, strengths, change_); !ok) return tl::unexpected(ok.error());
     const bool fell = after_ <= value_ - kSufficient * length * fall;
     if (fell) {
       penetration_ = contact_.penetration();
@@ -310,7 +288,7 @@ Result<EstimateStatus> LoadDescent::descend_smoothly(SampledOperators& sampled,
       }
     }
     limits.on_step();
-    if (limits.out_of_time()) return left(limits, step + 2);
+    if (limits.out_of_time()) return EstimateStatus::kDeadline;
   }
   return EstimateStatus::kIterationLimit;
 }
@@ -333,9 +311,7 @@ Result<EstimateStatus> LoadDescent::descend_to_edge(SampledOperators& sampled,
     decrement_ = std::sqrt(2.0 * std::max(0.0, bundle_.fall()));
     if (decrement_ <= kDecrement) return EstimateStatus::kConverged;
     change_ = length * bundle_.step();
-    if (auto ok = attempt(sampled, strengths, change_, limits); !ok) {
-      return left(limits, step + 1, ok.error());
-    }
+    if (auto ok = attempt(sampled, strengths, change_); !ok) return tl::unexpected(ok.error());
     if (after_ <= value_ - kSufficientOfBundle * length * bundle_.fall()) {
       accept_trial();
       bundle_.move(change_, value_ - after_);
@@ -344,17 +320,16 @@ Result<EstimateStatus> LoadDescent::descend_to_edge(SampledOperators& sampled,
       length = 1.0;
       turns = 0;
     } else {
-      const bool kept = bundle_.add_at(change_, after_ - value_, next_);
-      if (!kept || ++turns > kMaxTurnsOfBundle) length *= 0.5;
+      bundle_.add_at(change_, after_ - value_, next_);
+      if (++turns > kMaxTurnsOfBundle) length *= 0.5;
     }
     limits.on_step();
-    if (limits.out_of_time()) return left(limits, step + 2);
+    if (limits.out_of_time()) return EstimateStatus::kDeadline;
   }
   return EstimateStatus::kIterationLimit;
 }
 
-Status LoadDescent::average(SampledOperators& sampled, PriorStrengths& strengths,
-                            const DescentLimits& limits) {
+Status LoadDescent::average(SampledOperators& sampled, PriorStrengths& strengths) {
   auto shift = shift_.head(posterior_.unknowns());
   bool finite = false;
   {
@@ -369,13 +344,9 @@ Status LoadDescent::average(SampledOperators& sampled, PriorStrengths& strengths
   step_ = shift.tail(window_.count);
   double length = reach(contact_.penetration(), most_changes() / 2);
   for (;; length *= 0.5) {
-    if (length < kShortestStep || limits.out_of_time()) length = 0.0;
+    if (length < kShortestStep) length = 0.0;
     mean_z_ = z_ + length * step_;
-    if (auto status = length == 0.0 ? return_contact() : solve_contact(mean_z_, limits.out_of_time);
-        !status) {
-      if (length == 0.0 || !limits.out_of_time()) return status;
-      continue;
-    }
+    if (auto status = solve_contact(mean_z_); !status) return status;
     if (length == 0.0 || misfit(sampled, strengths, mean_z_) <= most_probable + kLostByMean) break;
   }
   posterior_.set_answer(length * shift.head(posterior_.unknowns() - window_.count), mean_z_);

@@ -59,12 +59,10 @@ inline constexpr double kLostByMean = 1.0;
 inline constexpr double kRoughDecrement = 0.2;
 
 struct DescentLimits {
-  int max_steps = 100;   // of one descent
-  std::stop_token stop;  // looked at before every step
-  // Or asked to stop. Looked at after every step and between two sets of contact; a step that is
-  // not done then is left, and contact at the loads before it taken back.
-  std::function<bool()> out_of_time;
-  std::function<void()> on_step;  // after every step, for the history
+  int max_steps = 100;                // of one descent
+  std::stop_token stop;               // looked at before every step
+  std::function<bool()> out_of_time;  // looked at after every step
+  std::function<void()> on_step;      // after every step, for the history
 };
 
 class LoadDescent {
@@ -84,9 +82,8 @@ class LoadDescent {
   // The minimum of the present linear model, for posterior(); the loads stay where they are.
   Status minimise(const PriorStrengths& strengths);
   // To the minimum of the present linear model for strengths that are new, and the linear model
-  // there: kConverged. kDeadline: the loads stay where they are. stopped().
-  Result<EstimateStatus> jump(SampledOperators& sampled, const PriorStrengths& strengths,
-                              const DescentLimits& limits);
+  // there.
+  Status jump(SampledOperators& sampled, const PriorStrengths& strengths);
   // Descends from z until decrement() is at most kDecrement (fine) or kRoughDecrement. Ends with
   // the linear model of the set at z: kConverged, kIterationLimit or kDeadline. Errors of the
   // members and stopped().
@@ -94,9 +91,8 @@ class LoadDescent {
                                  bool fine, const DescentLimits& limits);
   // The mean over the hypotheses, which were weighed for the present linear model, and contact for
   // it. Nearer to the most probable loads where contact changes in many slaves on the way, or where
-  // the mean would be less probable than those by more than kLostByMean for its misfit alone. The
-  // most probable loads where time is over.
-  Status average(SampledOperators& sampled, PriorStrengths& strengths, const DescentLimits& limits);
+  // the mean would be less probable than those by more than kLostByMean for its misfit alone.
+  Status average(SampledOperators& sampled, PriorStrengths& strengths);
   // Its covariance.
   Status spread(PriorStrengths& strengths);
 
@@ -123,16 +119,15 @@ class LoadDescent {
   // value_ and newton_ at z_, from the linear model there.
   Status begin(SampledOperators& sampled, const PriorStrengths& strengths);
   // Contact, after_ and next_ at trial_ = z_ + the step whose whitened image is given.
-  Status attempt(SampledOperators& sampled, const PriorStrengths& strengths, const VecX& whitened,
-                 const DescentLimits& limits);
+  Status attempt(SampledOperators& sampled, const PriorStrengths& strengths, const VecX& whitened);
   bool far_from_model() const;
   int most_changes() const;
   // ContactReach::along(step_).
   double reach(const VecX& penetration, int most);
   // Contact at z, from the forces that the linear model predicts.
-  Status solve_contact(const VecX& z, const std::function<bool()>& over = {});
+  Status solve_contact(const VecX& z);
   // The same at z_, unless contact_ is there already.
-  Status return_contact(const std::function<bool()>& over = {});
+  Status return_contact();
   // trial_ becomes z_; contact_ is there already.
   void accept_trial();
   // The first sum of J at z, whose contact is solved, without the loads' own.

@@ -100,9 +100,7 @@ Status SettledLoads::begin(const DescentLimits& limits, EstimateStatus& outcome)
 
 Result<bool> SettledLoads::go_round(const InversionOptions& asked, const DescentLimits& limits,
                                     Round& round) {
-  if (auto ok = descent_.average(sampled_, strengths_, limits); !ok) {
-    return tl::unexpected(ok.error());
-  }
+  if (auto ok = descent_.average(sampled_, strengths_); !ok) return tl::unexpected(ok.error());
   if (round.outcome != EstimateStatus::kConverged) return true;
   if (round.depth == Depth::kLast) {
     round.outcome = EstimateStatus::kIterationLimit;
@@ -197,10 +195,8 @@ Result<bool> SettledLoads::refit(bool may_change) {
 Status SettledLoads::find_strengths(const DescentLimits& limits, EstimateStatus& outcome) {
   if (auto status = fit(); !status) return status;
   for (int fit = 1;; ++fit) {
-    auto descended = descent_.jump(sampled_, strengths_, limits);
-    if (descended && *descended == EstimateStatus::kConverged) {
-      descended = descent_.descend(sampled_, strengths_, false, limits);
-    }
+    if (auto status = descent_.jump(sampled_, strengths_); !status) return status;
+    const auto descended = descent_.descend(sampled_, strengths_, false, limits);
     if (!descended) return tl::unexpected(descended.error());
     outcome = *descended;
     // Strengths that change need loads of their own.

@@ -66,7 +66,7 @@ void ContactAtLoads::begin_from(const std::vector<int>& slaves,
   }
 }
 
-Status ContactAtLoads::solve(const VecX& z, const std::function<bool()>& over) {
+Status ContactAtLoads::solve(const VecX& z) {
   const auto modes = operators_.slave_modes.middleCols(window_.first, window_.count);
   team_.split(free_penetration_.size(), [&](long begin, long end) {
     free_penetration_.segment(begin, end - begin).noalias() =
@@ -83,9 +83,6 @@ Status ContactAtLoads::solve(const VecX& z, const std::function<bool()>& over) {
   all_forces_.setZero();
   double value = std::numeric_limits<double>::infinity();
   while (sets_ < kMaxSets) {
-    if (sets_ > 0 && over && over()) {
-      return fail(ErrorCode::kNotConverged, "contact: ended before the active set had settled");
-    }
     ++sets_;
     list_active(set_, active_);
     if (auto status = system_.take(set_); !status) return status;

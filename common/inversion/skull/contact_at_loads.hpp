@@ -15,7 +15,6 @@
 // construction, but for what that makes once.
 #pragma once
 
-#include <functional>
 #include <vector>
 
 #include "common/contact/penalty.hpp"
@@ -39,8 +38,8 @@ class ContactAtLoads {
   // The next search begins from these forces of these slaves, N; where they pull, from 0.
   void begin_from(const std::vector<int>& slaves, const Eigen::Ref<const VecX>& forces);
   // Solves for z from the last forces on, or from those of begin_from(). kNotConverged after
-  // kMaxSets sets, or when `over`, asked between two sets, says so; errors of ContactSystem::take.
-  Status solve(const VecX& z, const std::function<bool()>& over = {});
+  // kMaxSets sets; errors of ContactSystem::take.
+  Status solve(const VecX& z);
   // out += T^T felt with T of the present set (contact_system.hpp): what forces felt by data mean
   // for the modes. felt: one per active slave; out: r.
   Status add_adjoint(const Eigen::Ref<const VecX>& felt, VecX& out);
