@@ -40,6 +40,17 @@ target_include_directories(brainshift_mumps SYSTEM INTERFACE ${MUMPS_INCLUDE_DIR
 target_link_libraries(brainshift_mumps INTERFACE
   ${MUMPS_LIBRARY} ${MUMPS_COMMON_LIBRARY} ${MUMPS_MPI_STUB_LIBRARY})
 
+# The parallel MUMPS, for brainshiftd-mpi alone. Both MUMPS have the same names: what stands first in a program's link line wins.
+if(BRAINSHIFT_MPI)
+  find_package(MPI REQUIRED COMPONENTS C)
+  find_library(MUMPS_MPI_LIBRARY dmumps REQUIRED)
+  find_library(MUMPS_MPI_COMMON_LIBRARY mumps_common REQUIRED)
+  add_library(brainshift_mpi_libraries INTERFACE)
+  target_include_directories(brainshift_mpi_libraries SYSTEM INTERFACE ${MUMPS_INCLUDE_DIR} ${MPI_C_INCLUDE_DIRS})
+  target_link_libraries(brainshift_mpi_libraries INTERFACE
+    ${MUMPS_MPI_LIBRARY} ${MUMPS_MPI_COMMON_LIBRARY} ${MPI_C_LIBRARIES})
+endif()
+
 # BLAS and LAPACK by their standard names, as CHOLMOD links them.
 find_path(CBLAS_INCLUDE_DIR cblas.h PATH_SUFFIXES openblas-pthread REQUIRED)
 find_library(BLAS_LIBRARY blas REQUIRED)

@@ -45,7 +45,24 @@ fem::DofMap constrain(const BrainModel& model, Boundary boundary) {
 
 Result<fem::StiffnessFactor> factorise(const BrainModel& model, const CaseConfig& config,
                                        const fem::MaterialMap& materials, const fem::DofMap& dofs,
-                                       const linalg::SymmetricMatrix& stiffness) {
+                                       const linalg::SymmetricMatrix& stiffness,
+                                       const SharedNodes& shared) {
+  if (shared.ranks != nullptr) {
+    if (config.scene.pressure == Carry::kOn) {
+      return invalid("scene.pressure = on: a model with pressure is prepared by one process");
+    }
+    std::vector<int> part(static_cast<std::size_t>(dofs.num_unknowns()));
+    for (int node = 0; node < dofs.num_nodes(); ++node) {
+      for (int axis = 0; axis < 3; ++axis) {
+        const int unknown = dofs.unknown(node, axis);
+        if (unknown < 0) continue;
+        part[static_cast<std::size_t>(unknown)] = shared.part[static_cast<std::size_t>(node)];
+      }
+    }
+    auto parts = linalg::DistributedCholesky::factorise(stiffness, part, *shared.ranks);
+    if (!parts) return tl::unexpected(parts.error());
+    return fem::StiffnessFactor(std::move(*parts));
+  }
   if (config.scene.pressure != Carry::kOn) {
     auto drained = linalg::SparseCholesky::factorise(stiffness);
     if (!drained) return tl::unexpected(drained.error());
@@ -108,7 +125,8 @@ ForwardModel::ForwardModel(Boundary boundary, fem::DofMap dofs,
       assemble_s_(assemble_s) {}
 
 Result<ForwardModel> ForwardModel::build(const BrainModel& model, const CaseConfig& config,
-                                         Boundary boundary, const Progress& progress) {
+                                         Boundary boundary, const Progress& progress,
+                                         const SharedNodes& shared) {
   const Stopwatch watch;
   report(progress, "assemble", 0.0);
   fem::DofMap dofs = constrain(model, boundary);
@@ -126,7 +144,7 @@ Result<ForwardModel> ForwardModel::build(const BrainModel& model, const CaseConf
     pairs = std::move(*found);
   }
   report(progress, "factorise", 0.0);
-  auto factor = factorise(model, config, *materials, dofs, stiffness);
+  auto factor = factorise(model, config, *materials, dofs, stiffness, shared);
   if (!factor) return tl::unexpected(factor.error());
   report(progress, "factorise", 1.0);
   return ForwardModel(boundary, std::move(dofs), stiffness, std::move(*factor),

@@ -22,6 +22,7 @@
 #include "common/contact/penalty.hpp"
 #include "common/core/error.hpp"
 #include "common/core/progress.hpp"
+#include "common/core/ranks.hpp"
 #include "common/fem/displacement_space.hpp"
 #include "common/fem/dof_map.hpp"
 #include "common/fem/elasticity.hpp"
@@ -43,12 +44,20 @@ namespace brainshift::contact {
 // kEmptySet: no tetrahedron has its centre in the tumour.
 Result<fem::MaterialMap> tissue_map(const BrainModel& model, const Material& material);
 
+// Processes that hold one factor together, and whose part each node is (DistributedCholesky).
+struct SharedNodes {
+  Ranks* ranks = nullptr;  // nullptr: this process alone
+  std::vector<int> part;
+};
+
 class ForwardModel {
  public:
   // kFloatingBody, kSingularMatrix, kNotFinite: as StiffnessFactor. kEmptySet and
   // kDegenerateMesh: as search_contact. kInvalidArgument and kEmptySet: as tissue_map.
+  // kInvalidArgument: pressure by several processes.
   static Result<ForwardModel> build(const BrainModel& model, const CaseConfig& config,
-                                    Boundary boundary, const Progress& progress = {});
+                                    Boundary boundary, const Progress& progress = {},
+                                    const SharedNodes& shared = {});
 
   // Drained elasticity on linear or quadratic elements, with the constraints and the contact of the
   // caller. The pairs' slaves are nodes of the space, free and with the identity frame. Vertices of

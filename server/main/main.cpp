@@ -1,21 +1,39 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // brainshiftd: prepares patient models before surgery and serves estimates during it.
 #include <sys/stat.h>
+#include <unistd.h>
 
 #include <CLI/CLI.hpp>
+#include <cerrno>
 #include <cstdio>
+#include <cstdlib>
+#include <cstring>
 #include <exception>
+#include <filesystem>
 #include <string>
 
 #include "common/io/files/stop_signals.hpp"
 #include "common/linalg/openblas.hpp"
 #include "server/main/commands.hpp"
+#ifdef BRAINSHIFT_MPI
+#include "common/mpi/mpi_ranks.hpp"
+#endif
 
 namespace {
 
 using namespace brainshift::server;
 
-int parse_and_run(int argc, char** argv) {
+#ifndef BRAINSHIFT_MPI
+// mpirun's name for the number of processes; 1 without it.
+int processes() {
+  const char* size = std::getenv("OMPI_COMM_WORLD_SIZE");
+  if (size == nullptr) size = std::getenv("PMI_SIZE");
+  return size == nullptr ? 1 : std::atoi(size);
+}
+#endif
+
+// ranks: of brainshiftd-mpi with several processes, else nullptr.
+int parse_and_run(int argc, char** argv, brainshift::Ranks* ranks) {
   CLI::App app(
       "Estimates brain shift during surgery from sparse measurements. Research software, no "
       "medical device.",
@@ -77,10 +95,17 @@ int parse_and_run(int argc, char** argv) {
     const auto unknown = app.remaining(true);
     const std::string reason =
         unknown.empty() ? std::string(error.what()) : "unknown argument " + unknown.front();
+    if (ranks != nullptr && ranks->rank() > 0) return brainshift::kExitBadInput;
     return print_error(
         {brainshift::ErrorCode::kInvalidArgument, reason + " (see brainshiftd --help)"});
   }
+  prepare.ranks = ranks;
   if (prepare_command->parsed()) return run_prepare(prepare);
+  if (ranks != nullptr) {
+    return print_error(
+        {brainshift::ErrorCode::kInvalidArgument,
+         "only prepare runs as several processes; start this command without mpirun"});
+  }
   if (health_command->parsed()) return run_health(health);
   return run_serve(serve);
 }
@@ -88,12 +113,30 @@ int parse_and_run(int argc, char** argv) {
 }  // namespace
 
 int main(int argc, char** argv) {
+#ifndef BRAINSHIFT_MPI
+  // Under mpirun the program with the parallel MUMPS takes over.
+  if (processes() > 1) {
+    std::error_code ignored;
+    const std::string program =
+        std::filesystem::read_symlink("/proc/self/exe", ignored).string() + "-mpi";
+    execv(program.c_str(), argv);
+    return print_error(
+        {brainshift::ErrorCode::kInvalidArgument,
+         std::to_string(processes()) + " processes need " + program +
+             " (build option BRAINSHIFT_MPI), which does not run: " + std::strerror(errno)});
+  }
+#endif
   brainshift::linalg::choose_blas_kernel();
   brainshift::linalg::use_single_threaded_blas();
   brainshift::io::survive_failing_writes();
   umask(077);  // files hold a patient's data
   try {
-    return parse_and_run(argc, argv);
+#ifdef BRAINSHIFT_MPI
+    brainshift::mpi::MpiRanks ranks(&argc, &argv);
+    return parse_and_run(argc, argv, ranks.size() > 1 ? &ranks : nullptr);
+#else
+    return parse_and_run(argc, argv, nullptr);
+#endif
   } catch (const std::exception& exception) {
     std::fprintf(stderr, "brainshiftd: unexpected failure: %s\n", exception.what());
     return brainshift::kExitFailure;
