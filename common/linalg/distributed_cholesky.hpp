@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // DistributedCholesky: K^-1 of a symmetric positive definite matrix by several processes, each of
-// which holds a part of the factor (docs/decisions/0039).
+// which holds a part of the factor (docs/decisions/0042).
 //
 // The unknowns are dealt into parts, one per process. Those that meet a part of lower number are
 // the interface b; what is left of part r, its interior i_r, meets no other interior. So

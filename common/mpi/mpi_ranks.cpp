@@ -7,28 +7,32 @@
 #include <mpi.h>
 
 #include <algorithm>
+#include <ctime>
 #include <exception>
 #include <type_traits>
 #include <utility>
-
-#include "common/core/stopwatch.hpp"
 
 namespace brainshift::mpi {
 namespace {
 
 constexpr std::size_t kPiece = std::size_t{1} << 29;  // bytes or numbers of one message: an int
 
-// Adds the time of a call to the traffic.
+// Adds the processor time of a call to the traffic: MPI asks for messages all the time.
 class Timed {
  public:
   explicit Timed(Ranks::Traffic& traffic) : traffic_(traffic) {}
-  ~Timed() { traffic_.seconds += watch_.seconds(); }
+  ~Timed() { traffic_.seconds += now() - begin_; }
   Timed(const Timed&) = delete;
   Timed& operator=(const Timed&) = delete;
 
  private:
+  static double now() {
+    timespec time{};
+    clock_gettime(CLOCK_THREAD_CPUTIME_ID, &time);
+    return static_cast<double>(time.tv_sec) + 1e-9 * static_cast<double>(time.tv_nsec);
+  }
   Ranks::Traffic& traffic_;
-  Stopwatch watch_;
+  double begin_ = now();
 };
 
 class MumpsFactor final : public SummedFactor {
@@ -87,10 +91,10 @@ class MumpsFactor final : public SummedFactor {
   }
 
   Status solve(const Eigen::MatrixXd& b, Eigen::MatrixXd& x) override {
-    const Timed timed(traffic_);
     columns_ = b.transpose();
     const auto count = static_cast<std::size_t>(columns_.size());
     for (std::size_t at = 0; at < count; at += kPiece) {
+      const Timed timed(traffic_);
       const auto piece = static_cast<int>(std::min(kPiece, count - at));
       MPI_Reduce(rank_ == 0 ? MPI_IN_PLACE : columns_.data() + at, columns_.data() + at, piece,
                  MPI_DOUBLE, MPI_SUM, 0, MPI_COMM_WORLD);
@@ -102,6 +106,7 @@ class MumpsFactor final : public SummedFactor {
     const int status = columns_.cols() > 0 ? call(3) : 0;
     mumps_.rhs = nullptr;
     for (std::size_t at = 0; at < count; at += kPiece) {
+      const Timed timed(traffic_);
       MPI_Bcast(columns_.data() + at, static_cast<int>(std::min(kPiece, count - at)), MPI_DOUBLE, 0,
                 MPI_COMM_WORLD);
     }
@@ -113,8 +118,9 @@ class MumpsFactor final : public SummedFactor {
     return fail(ErrorCode::kInternal, fmt::format("solve: MUMPS status {}", status));
   }
 
-  std::size_t bytes() const override {  // MUMPS counts millions of bytes
-    return static_cast<std::size_t>(std::max(0, mumps_.info[20])) * 1000000;
+  std::size_t bytes() const override {  // numbers of the factor here, in millions when negative
+    const long numbers = mumps_.info[8];
+    return sizeof(double) * static_cast<std::size_t>(numbers < 0 ? -numbers * 1000000 : numbers);
   }
 
  private:
@@ -195,7 +201,6 @@ std::vector<Ranks::Bytes> MpiRanks::exchange(std::vector<Bytes> to) {
 }
 
 Result<std::unique_ptr<SummedFactor>> MpiRanks::factorise(SummedMatrix matrix) {
-  const Timed timed(traffic_);
   auto factor = std::make_unique<MumpsFactor>(rank_, size_, traffic_);
   if (auto ok = factor->factorise(std::move(matrix)); !ok) return tl::unexpected(ok.error());
   return factor;

@@ -115,7 +115,8 @@ constexpr int kMaxNodesForTwoFactors = 40000;
 FactorisedLater factorise_beside(const std::shared_ptr<const BrainModel>& model,
                                  const CaseConfig& config, Boundary boundary,
                                  const PrepareOptions& options) {
-  if (model->mesh.num_nodes() > kMaxNodesForTwoFactors || options.ranks != nullptr) return {};
+  const bool one_thread = options.threads == 1 || options.ranks != nullptr;
+  if (model->mesh.num_nodes() > kMaxNodesForTwoFactors || one_thread) return {};
   return std::async(std::launch::async, [model, config, boundary] {
     return contact::ForwardModel::build(*model, config, boundary);
   });

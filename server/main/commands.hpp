@@ -22,6 +22,7 @@ struct PrepareArguments {
   std::filesystem::path case_file;
   std::filesystem::path out;
   bool json = false;
+  int threads = 0;         // 0: as many as cores; one for each of several processes
   Ranks* ranks = nullptr;  // processes that prepare it together; the first one writes and prints
 };
 

@@ -51,13 +51,19 @@ int parse_and_run(int argc, char** argv, brainshift::Ranks* ranks) {
   prepare_command->add_option("--case", prepare.case_file, "Case file (YAML)")->required();
   prepare_command->add_option("--out", prepare.out, "Model file to write (HDF5)")->required();
   prepare_command->add_flag("--json", prepare.json, "Print one JSON object instead of a table");
+  prepare_command
+      ->add_option("--threads", prepare.threads,
+                   "Threads that condense; 0: as many as the machine has cores")
+      ->check(CLI::Range(0, 16));
   prepare_command->footer(
       "Reads the images that the case names, meshes the brain, finds the node sets, factorises "
       "the\n"
       "model under both boundaries, and writes the model file.\n"
       "Examples:\n"
       "  brainshiftd prepare --case config/cases/colin27.yaml --out colin27.h5\n"
-      "  brainshiftd prepare --case my.yaml --out my.h5 --json | jq .prepare.contact.factor_s");
+      "  brainshiftd prepare --case my.yaml --out my.h5 --json | jq .prepare.contact.factor_s\n"
+      "  mpirun -np 8 brainshiftd prepare --case my.yaml --out my.h5   (with brainshiftd-mpi "
+      "beside it)");
 
   ServeArguments serve;
   auto* serve_command =

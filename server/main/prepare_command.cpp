@@ -88,6 +88,7 @@ Result<Outcome> prepare(const PrepareArguments& arguments, ProgressBar& bar) {
   if (auto ok = agreed(config); !ok) return tl::unexpected(ok.error());
   const bool first = arguments.ranks == nullptr || arguments.ranks->rank() == 0;
   options.ranks = arguments.ranks;
+  options.threads = arguments.threads;
   if (first) options.progress = bar.progress("");
   options.on_resume = [&] {
     bar.note(fmt::format("going on from {} of an interrupted run", options.checkpoint.string()));

@@ -39,7 +39,7 @@ class BlockRunner {
   // Columns of each block but the last, which may have fewer. An even number of blocks of the same
   // size, so that two or four cores end at the same time; whatever their number is, since a block's
   // numbers depend on its size in their last bits.
-  static int block_size(int columns, const Ranks* ranks) {
+  static int block_size(int columns, const Ranks* ranks = nullptr) {
     const int together = ranks == nullptr ? 2 : ranks->size();
     const int most = ranks == nullptr ? 2 * kBlock : std::max(kBlock, kLeastBlock * together);
     const int rounds = std::max(1, (columns + most - 1) / most);
@@ -79,7 +79,7 @@ class BlockRunner {
   template <typename Work>
   Status run(std::string_view stage, int columns, const Work& work) {
     if (ranks_ != nullptr) return run_together(stage, columns, work);
-    const int size = block_size(columns, nullptr), blocks = (columns + size - 1) / size;
+    const int size = block_size(columns), blocks = (columns + size - 1) / size;
     std::atomic<int> done{0};
     std::atomic<bool> failed{false};
     std::vector<Status> statuses(static_cast<std::size_t>(team_.size()));
