@@ -22,11 +22,11 @@
 #include "common/contact/penalty.hpp"
 #include "common/core/error.hpp"
 #include "common/core/progress.hpp"
-#include "common/core/ranks.hpp"
 #include "common/fem/displacement_space.hpp"
 #include "common/fem/dof_map.hpp"
 #include "common/fem/elasticity.hpp"
 #include "common/fem/stiffness_factor.hpp"
+#include "common/ranks/ranks.hpp"
 #include "common/values/brain_model.hpp"
 #include "common/values/estimate.hpp"
 

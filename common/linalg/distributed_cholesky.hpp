@@ -18,9 +18,9 @@
 #include <memory>
 #include <vector>
 
-#include "common/core/ranks.hpp"
 #include "common/linalg/checked_solve.hpp"
 #include "common/linalg/cholesky.hpp"
+#include "common/ranks/ranks.hpp"
 
 namespace brainshift::linalg {
 

@@ -140,7 +140,8 @@ class MumpsFactor final : public SummedFactor {
 }  // namespace
 
 MpiRanks::MpiRanks(int* argc, char*** argv) : exceptions_(std::uncaught_exceptions()) {
-  MPI_Init(argc, argv);
+  int given = 0;  // one thread calls MPI; others compute
+  MPI_Init_thread(argc, argv, MPI_THREAD_FUNNELED, &given);
   MPI_Comm_rank(MPI_COMM_WORLD, &rank_);
   MPI_Comm_size(MPI_COMM_WORLD, &size_);
 }

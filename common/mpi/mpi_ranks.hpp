@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// MpiRanks: the processes of MPI_COMM_WORLD (common/core/ranks.hpp). One per process, from
+// MpiRanks: the processes of MPI_COMM_WORLD (common/ranks/ranks.hpp). One per process, from
 // MPI_Init to MPI_Finalize. Summed matrices are factorised by MUMPS; how many bytes that exchanges
 // it does not tell, so that traffic() counts the right-hand sides and solutions alone.
 //
@@ -9,7 +9,7 @@
 
 #include <memory>
 
-#include "common/core/ranks.hpp"
+#include "common/ranks/ranks.hpp"
 
 namespace brainshift::mpi {
 

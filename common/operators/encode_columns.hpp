@@ -21,10 +21,10 @@
 
 #include "common/core/error.hpp"
 #include "common/core/progress.hpp"
-#include "common/core/ranks.hpp"
 #include "common/core/thread_team.hpp"
 #include "common/core/types.hpp"
 #include "common/operators/compact_columns.hpp"
+#include "common/ranks/ranks.hpp"
 
 namespace brainshift {
 

@@ -59,8 +59,8 @@ struct PreparedPatient {
 
 // Errors: of io::record_inputs, io::load_case_inputs, anatomy::build_brain_model,
 // PreparedModel::prepare and condense(), which name a key or file; of CheckpointFile; kUnavailable
-// when stopped. An error leaves the blocks that are finished in the checkpoint. By several processes
-// all have the error of the first that has one; kInternal when their models differ.
+// when stopped. An error leaves the blocks that are finished in the checkpoint. By several
+// processes: all have the error of the first that has one; kInternal when their models differ.
 Result<PreparedPatient> prepare_model(const CaseConfig& config, const PrepareOptions& options = {});
 
 }  // namespace brainshift::patient

@@ -9,7 +9,7 @@
 
 #include "common/core/error.hpp"
 #include "common/core/exit_status.hpp"
-#include "common/core/ranks.hpp"
+#include "common/ranks/ranks.hpp"
 
 namespace brainshift::server {
 

@@ -126,6 +126,9 @@ int main(int argc, char** argv) {
     const std::string program =
         std::filesystem::read_symlink("/proc/self/exe", ignored).string() + "-mpi";
     execv(program.c_str(), argv);
+    const char* rank = std::getenv("OMPI_COMM_WORLD_RANK");
+    if (rank != nullptr && std::atoi(rank) > 0)
+      return brainshift::kExitBadInput;  // one line of all
     return print_error(
         {brainshift::ErrorCode::kInvalidArgument,
          std::to_string(processes()) + " processes need " + program +

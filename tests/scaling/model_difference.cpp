@@ -4,7 +4,8 @@
 // object:
 // update_mm, of a node's displacement, which is summed up from what the file keeps in less than
 // single precision; compliance (relative) and modes_mm, of what it keeps in double precision: the
-// response of the skull's nodes to unit forces and to the modes. Exit status 1 when a node's displacement differs by more than BOUND_MM, 2 for bad input.
+// response of the skull's nodes to unit forces and to the modes.
+// Exit status 1 when a node's displacement differs by more than BOUND_MM, 2 for bad input.
 #include <fmt/format.h>
 
 #include <cstdlib>

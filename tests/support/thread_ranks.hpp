@@ -7,7 +7,7 @@
 #include <mutex>
 #include <thread>
 
-#include "common/core/ranks.hpp"
+#include "common/ranks/ranks.hpp"
 #include "tests/support/dense.hpp"
 
 namespace brainshift::test_support {

@@ -135,13 +135,17 @@ Result<MatrixXd> leading_modes(const TestVectors& omega, const MatrixXd& sketch,
          eigen.eigenvalues()[tested - 1 - rank] > smallest) {
     ++rank;
   }
+  // The first process chooses: another processor may find other signs, or another noise.
+  const bool chooses = runner.ranks() == nullptr || runner.ranks()->rank() == 0;
+  VecX chosen = VecX::Constant(1, chooses ? static_cast<double>(rank) : 0.0);
+  runner.sum(chosen);
+  rank = static_cast<Eigen::Index>(chosen[0]);
   MatrixXd scaled(tested, rank);
   for (Eigen::Index j = 0; j < rank; ++j) {
     scaled.col(j) =
         eigen.eigenvectors().col(tested - 1 - j) / std::sqrt(eigen.eigenvalues()[tested - 1 - j]);
   }
-  // Processors of different kinds may have found different signs.
-  if (runner.ranks() != nullptr && runner.ranks()->rank() > 0) scaled.setZero();
+  if (!chooses) scaled.setZero();
   runner.sum(scaled);
   MatrixXd modes(rank, sketch.cols());
   linalg::blas::multiply_transposed(1.0, scaled.middleRows(first, sketch.rows()), sketch, 0.0,

@@ -1,4 +1,4 @@
-// SPDX-License-Identifier: Apache-2.0
+// SPDX-License-Identifier: GPL-3.0-or-later
 // Ranks: processes that prepare one model together, as seen by one of them. Who implements it
 // (common/mpi) knows how messages travel; nobody else does.
 //

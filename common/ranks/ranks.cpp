@@ -1,5 +1,5 @@
-// SPDX-License-Identifier: Apache-2.0
-#include "common/core/ranks.hpp"
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "common/ranks/ranks.hpp"
 
 #include <cstring>
 
