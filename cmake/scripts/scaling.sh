@@ -4,7 +4,7 @@
 # BRAINSHIFT_MPI. Empties OUT_DIR (default: out/scaling) and writes rows.csv (a row per run), updates.csv (models by several
 # processes against that by one), machine.txt, fit.csv, tables.md and pictures. One size after the other, its runs in turn.
 #   QUICK=1          two small meshes, into out/scaling-quick
-#   EDGES="5.75 4.4 3.3"   edge lengths of the mesh of config/cases/colin27.yaml, mm: 18, 40, 94 thousand nodes (2.35: 250)
+#   EDGES="9 7 5.75 4.4 3.25"   edge lengths of the mesh of config/cases/colin27.yaml, mm: 5, 10, 18, 39, 94 thousand nodes (2.35: 250)
 #   RANKS="2"        numbers of processes beside one
 #   MEMORY_GIB=8     what a process may take; a preparation that needs more is refused
 #   CORES=1          also one process with all cores, today's way
@@ -14,7 +14,7 @@ cd "$(dirname "$0")/../.."
 build=${1:?usage: scaling.sh BUILD_DIR [OUT_DIR]}
 bin=$(realpath "$build/bin")
 out=${2:-out/scaling}
-edges=${EDGES:-5.75 4.4 3.3}
+edges=${EDGES:-9 7 5.75 4.4 3.25}
 if [ "${QUICK:-0}" = 1 ]; then
   out=${2:-out/scaling-quick}
   edges=${EDGES:-12 9}

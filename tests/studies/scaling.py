@@ -26,7 +26,7 @@ MILLION, PROCESSES = 1e6, (8, 16, 32, 64)
 GIB = 2.0 ** 30
 # Updates are sums of what the file keeps in steps of 2^-25 (modes) and 2^-23 (contact) of the greatest number: two files whose
 # numbers in double precision agree differ by some of these.
-TIME_BOUND, MEMORY_BOUND, MODES_BOUND_MM, UPDATE_BOUND_MM, LARGE = 0.65, 0.6, 1e-9, 1e-6, 90000
+TIME_BOUND, MEMORY_BOUND, MODES_BOUND_MM, UPDATE_BOUND_MM, LARGE = 0.65, 0.6, 1e-9, 1e-6, 85000
 
 
 @dataclass
