@@ -422,7 +422,16 @@ MatrixXd SparseCholesky::schur_complement() const {
   }
   MatrixXd complement = MatrixXd::Zero(impl_->kept, impl_->kept);
   blas::subtract_outer(factor, complement);
-  return -complement;
+  complement *= -1.0;
+  return complement;
+}
+
+void SparseCholesky::drop_kept() {
+  cholmod_factor& factor = *impl_->factor;
+  std::size_t used = impl_->widths.size();
+  while (used > 0 && impl_->widths[used - 1] == 0) --used;
+  const auto numbers = static_cast<std::size_t>(view_of(factor).at[used]);
+  factor.x = cholmod_l_realloc(numbers, sizeof(double), factor.x, &factor.xsize, &impl_->common);
 }
 
 int SparseCholesky::size() const { return static_cast<int>(impl_->factor->n); }

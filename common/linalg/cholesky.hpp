@@ -92,6 +92,8 @@ class SparseCholesky {
   void finish_rows(const Eigen::MatrixXd& kept, Eigen::MatrixXd& x, Workspace& workspace) const;
   // Lower triangle of K_bb - K_bi K_ii^-1 K_ib.
   Eigen::MatrixXd schur_complement() const;
+  // Frees the columns of the kept unknowns: after this the two halves of a solve are all that works.
+  void drop_kept();
 
   int size() const;
   double rcond() const;            // CHOLMOD's estimate: squared ratio of extreme pivots of L

@@ -211,6 +211,7 @@ Result<DistributedCholesky> DistributedCholesky::factorise(const SymmetricMatrix
       return tl::unexpected(ok.error());
     }
     impl.summed = std::move(*summed);
+    if (impl.local) impl.local->drop_kept();
   }
   std::vector<double> rconds(static_cast<std::size_t>(ranks.size()));
   rconds[static_cast<std::size_t>(ranks.rank())] = impl.local ? impl.local->rcond() : 1.0;

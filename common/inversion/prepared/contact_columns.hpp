@@ -41,11 +41,12 @@ class BlockRunner {
   // numbers depend on its size in their last bits.
   static int block_size(int columns, const Ranks* ranks = nullptr) {
     const int together = ranks == nullptr ? 2 : ranks->size();
-    const int most = ranks == nullptr ? 2 * kBlock : std::max(kBlock, kLeastBlock * together);
+    const int most = together * (ranks == nullptr ? kBlock : kSharedBlock);
     const int rounds = std::max(1, (columns + most - 1) / most);
     return std::max(1, (columns + together * rounds - 1) / (together * rounds));
   }
-  static constexpr int kLeastBlock = 24;  // of a process that has many beside it
+  // Of several processes: each has that many of its own, and its part of everybody's.
+  static constexpr int kSharedBlock = 24;
 
   // The own columns are [own_first(columns), own_first(columns) + own_count(columns)).
   int own_first(int columns) const { return std::min(columns, part(columns, rank())); }
