@@ -92,7 +92,7 @@ class SparseCholesky {
   void finish_rows(const Eigen::MatrixXd& kept, Eigen::MatrixXd& x, Workspace& workspace) const;
   // Lower triangle of K_bb - K_bi K_ii^-1 K_ib.
   Eigen::MatrixXd schur_complement() const;
-  // Frees the columns of the kept unknowns: after this the two halves of a solve are all that works.
+  // Frees the columns of the kept unknowns. Afterwards only the two halves of a solve work.
   void drop_kept();
 
   int size() const;

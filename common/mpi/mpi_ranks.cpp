@@ -208,3 +208,11 @@ Result<std::unique_ptr<SummedFactor>> MpiRanks::factorise(SummedMatrix matrix) {
 }
 
 }  // namespace brainshift::mpi
+
+namespace brainshift {
+
+std::unique_ptr<Ranks> start_ranks(int* argc, char*** argv) {
+  return std::make_unique<mpi::MpiRanks>(argc, argv);
+}
+
+}  // namespace brainshift

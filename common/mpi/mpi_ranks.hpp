@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // MpiRanks: the processes of MPI_COMM_WORLD (common/ranks/ranks.hpp). One per process, from
-// MPI_Init to MPI_Finalize. Summed matrices are factorised by MUMPS; how many bytes that exchanges
-// it does not tell, so that traffic() counts the right-hand sides and solutions alone.
+// MPI_Init to MPI_Finalize. Summed matrices are factorised by MUMPS.
 //
 // A process that ends without the others ends all of them (MPI_Abort in the destructor of an object
 // that is destroyed by an exception, MPI's own handler for errors).

@@ -50,8 +50,8 @@ class Ranks {
   // kFloatingBody when A is not positive definite; kInternal.
   virtual Result<std::unique_ptr<SummedFactor>> factorise(SummedMatrix matrix) = 0;
 
-  // Of this process so far: bytes to others, and the time of all calls of this class, in which it
-  // mostly waits.
+  // Of this process so far: bytes to others, and the processor time that messages took, waiting for
+  // them included. What a factorise() and its solves exchange inside is not counted.
   struct Traffic {
     std::uint64_t bytes_sent = 0;
     double seconds = 0.0;
@@ -67,5 +67,9 @@ class Ranks {
     return static_cast<int>(static_cast<long>(count) * r / size());
   }
 };
+
+// The processes that mpirun started. Once in a process, before anything else; only programs that link
+// common/mpi, which defines it.
+std::unique_ptr<Ranks> start_ranks(int* argc, char*** argv);
 
 }  // namespace brainshift

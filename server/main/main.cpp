@@ -15,9 +15,6 @@
 #include "common/io/files/stop_signals.hpp"
 #include "common/linalg/openblas.hpp"
 #include "server/main/commands.hpp"
-#ifdef BRAINSHIFT_MPI
-#include "common/mpi/mpi_ranks.hpp"
-#endif
 
 namespace {
 
@@ -141,8 +138,8 @@ int main(int argc, char** argv) {
   umask(077);  // files hold a patient's data
   try {
 #ifdef BRAINSHIFT_MPI
-    brainshift::mpi::MpiRanks ranks(&argc, &argv);
-    return parse_and_run(argc, argv, ranks.size() > 1 ? &ranks : nullptr);
+    const auto ranks = brainshift::start_ranks(&argc, &argv);
+    return parse_and_run(argc, argv, ranks->size() > 1 ? ranks.get() : nullptr);
 #else
     return parse_and_run(argc, argv, nullptr);
 #endif
