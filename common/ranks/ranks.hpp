@@ -68,8 +68,8 @@ class Ranks {
   }
 };
 
-// The processes that mpirun started. Once in a process, before anything else; only programs that link
-// common/mpi, which defines it.
+// The processes that mpirun started. Once in a process, before anything else. Defined by common/mpi:
+// for programs that link it.
 std::unique_ptr<Ranks> start_ranks(int* argc, char*** argv);
 
 }  // namespace brainshift
