@@ -68,7 +68,7 @@ class Ranks {
   }
 };
 
-// The processes that mpirun started. Once in a process, before anything else. Defined by common/mpi:
+// The processes that mpirun started. Once in a process, before anything else. In common/mpi,
 // for programs that link it.
 std::unique_ptr<Ranks> start_ranks(int* argc, char*** argv);
 
