@@ -175,31 +175,42 @@ def same_updates(rows, others):
             Table(others.columns, [one for _, one in both], others.origin))
 
 
-def score_against(rows, others, name, bounds, record):
-    """The interval score of all nodes, ours over theirs on the same updates. bounds: {"truths": most}."""
+def check_against(rows, others, name, bounds, record):
+    """Ours over theirs on the same updates. bounds: (truths, what, column, at most)."""
     outside_kinds = set(split(rows)[1].values("scenario"))
-    for truths, most in bounds.items():
-        chosen = {"all truths": lambda row: True, "own truths": lambda row: row["scenario"] not in outside_kinds,
-                  "truths from outside": lambda row: row["scenario"] in outside_kinds}[truths]
-        ours, theirs = same_updates(rows.where(chosen), others)
-        if not len(ours):
-            record.left_out(STUDY, f"{truths}: interval score over that of {name}: no rows of the same surgeries")
+    for truths, what, column, most in bounds:
+        own = lambda row: row["scenario"] not in outside_kinds
+        ours, theirs = same_updates(rows.where(own) if truths == "own truths" else rows, others)
+        called = f"{truths}: {what} over that of {name}"
+        if not len(ours) or not theirs.has(column):
+            record.left_out(STUDY, f"{called}: no rows of the same surgeries")
             continue
-        ratio = clusters.same_over(ours, theirs, "all_interval_mm")
-        record.check(STUDY, f"{truths}: interval score over that of {name}", ratio.mean, f"<= {most:g} ({ratio})",
-                     ratio.mean <= most, f"{len(ours)} updates")
+        ratio = clusters.same_over(ours, theirs, column)
+        record.check(STUDY, called, ratio.mean, f"<= {most:g} ({ratio})", ratio.mean <= most, f"{len(ours)} updates")
+
+
+def compare(rows, before, fixed, record):
+    """Against the earlier default and against fixed strengths, where their tables are at hand."""
+    check_against(rows, before, "the earlier default",
+                  (("all truths", "interval score", "all_interval_mm", 0.6),
+                   ("own truths", "interval score", "all_interval_mm", 1.6),
+                   ("own truths", "tumour error", "tumour_mm", 1.05),
+                   ("own truths", "field error", "field_mean_mm", 1.05)), record)
+    check_against(rows, fixed, "fixed strengths", (("all truths", "interval score", "all_interval_mm", 1.0),), record)
 
 
 def sharpness(rows, record):
     """Of the prior's own truths near the data, with all sources of each surgery."""
     if not len(rows) or not rows.has("near_coverage_90"):
+        record.left_out(STUDY, "own truths: coverage and sharpness near the data: no rows of them")
         return
     for head, own in last_updates(rows).groups("head").items():
         covered = clusters.mean(own, or_zero("near_coverage_90"))
-        record.check(head, "own truths: coverage of the 90 % interval near the data", covered.mean, f">= 0.85 ({covered})",
-                     covered.mean >= 0.85)
+        record.check(STUDY, f"own truths on {head}: coverage of the 90 % interval near the data", covered.mean,
+                     f">= 0.85 ({covered})", covered.mean >= 0.85)
         width = clusters.ratio(own, "near_rms_sd_mm", "near_rms_error_mm")
-        record.check(head, "own truths: rms sd over rms error near the data", width.mean, f"<= 3 ({width})", width.mean <= 3)
+        record.check(STUDY, f"own truths on {head}: rms sd over rms error near the data", width.mean, f"<= 3 ({width})",
+                     width.mean <= 3)
 
 
 def _mean(column):
@@ -293,7 +304,10 @@ def draw_reliability(rows, folder):
                 ax.plot(INTERVALS, shares, label=name, **{**chart.style(k), "marker": "os^Dv<>"[k % 7]},
                         linestyle="-" if k < len(chart.COLOURS) else ":")
         chart.label(ax, "share that the interval promises (%)", "share of true components inside (%)")
-    chart.legend(axes[0], ncols=4, loc="upper left", bbox_to_anchor=(0.0, -0.13))
+    for ax in axes:
+        ax.set_ylim(min(one.get_ylim()[0] for one in axes), 101)
+    fig.get_layout_engine().set(rect=(0, 0.12, 1, 0.88))
+    fig.legend(*axes[0].get_legend_handles_labels(), ncols=4, loc="lower left", bbox_to_anchor=(0.04, 0.0))
     chart.save(fig, folder / "outside-reliability.png")
     return True
 
@@ -346,13 +360,3 @@ def main(arguments):
     checks = checks_of(Table.parse(table, "checks.csv"))
     print_checks(checks, [reason for _, reason in record.parts_left_out])
     return every_check_holds(checks)
-
-
-def compare(rows, before, fixed, record):
-    """The interval score against the earlier default and against fixed strengths, where their tables are at hand."""
-    for name, others, bounds in (("the earlier default", before, {"all truths": 0.6, "own truths": 1.6}),
-                                 ("fixed strengths", fixed, {"all truths": 1.0})):
-        if len(others) and others.has("all_interval_mm"):
-            score_against(rows, others, name, bounds, record)
-        else:
-            record.left_out(STUDY, f"interval score over that of {name}: no table of it")

@@ -165,9 +165,9 @@ def judge(rows, before, record, fixed=Table()):
     own_truths, from_outside = outside.split(rows)
     for head, own in own_truths.groups("head").items():
         HeadChecks(own, before.where(head=head), record).run()
-    outside.sharpness(own_truths, record)
     outside.judge(from_outside, record)
     if len(from_outside):
+        outside.sharpness(own_truths, record)
         outside.compare(rows, before, fixed, record)
 
 

@@ -30,6 +30,7 @@ def rows():
 
 
 SINGLE = "single surgeries with coverage below 0.6 %"
+SCORE = ("all truths", "interval score", "all_interval_mm", 0.6)
 UNSEEN = "updates without a right caution whose unmarked far field is wrong by 3 mm rms %"
 
 
@@ -106,14 +107,14 @@ def test_the_tumour_is_told_by_its_worst_head(rows):
 def test_scores_are_compared_on_the_same_updates(rows):
     def ratio(others, bounds=None):
         record = Record(None)
-        outside.score_against(table_of(rows), table_of(others), "x", bounds or {"all truths": 0.6}, record)
+        outside.check_against(table_of(rows), table_of(others), "x", bounds or (SCORE,), record)
         return [(float(one[2]), one[4]) for one in record.checks], record.parts_left_out
     twice = every(rows, all_interval_mm=4)
     assert ratio(twice) == ([(0.5, "1")], [])
     assert ratio(twice + [update(77, all_interval_mm=900)]) == ([(0.5, "1")], [])
     assert ratio(every(rows, all_interval_mm=2.5)) == ([(0.8, "0")], [])
     assert ratio(every(twice, place=9))[0] == [] and len(ratio(every(twice, place=9))[1]) == 1
-    assert ratio(twice, {"own truths": 1.6})[1] == [
+    assert ratio(twice, (("own truths", "interval score", "all_interval_mm", 1.6),))[1] == [
         ("outside", "own truths: interval score over that of x: no rows of the same surgeries")]
 
 
@@ -147,8 +148,8 @@ def test_sharpness_of_own_truths_has_two_sides(rows):
     def red(**cells):
         return Verdicts(lambda record: outside.sharpness(table_of(every(rows, **cells)), record)).red()
     assert red() == []
-    assert red(near_rms_sd_mm=0.76) == ["own truths: rms sd over rms error near the data"]
-    assert red(near_coverage_90=0.84) == ["own truths: coverage of the 90 % interval near the data"]
+    assert red(near_rms_sd_mm=0.76) == ["own truths on h: rms sd over rms error near the data"]
+    assert red(near_coverage_90=0.84) == ["own truths on h: coverage of the 90 % interval near the data"]
 
 
 def test_the_table_has_a_line_per_head_kind_and_data(rows):
@@ -163,9 +164,8 @@ def test_committed_rows_give_the_committed_checks_and_figures():
     record = Record(None)
     outside.judge(rows, record)
     outside.sharpness(own, record)
-    lines = [",".join(one) for one in record.checks]
     committed = (FOLDER / "checks.csv").read_text().splitlines()[1:]
-    assert lines == committed[:len(lines)]  # the others need the tables of other estimates
+    assert [",".join(one) for one in record.checks] == committed[:len(record.checks)]  # the others need other tables
     commit = (FOLDER / "summary.md").read_text().partition("commit ")[2].partition(".")[0]
     assert outside.summary_text(rows, commit) == (FOLDER / "summary.md").read_text()
     assert outside.table_text(rows) == (FOLDER / "outside.md").read_text()
@@ -192,7 +192,7 @@ def test_the_command_tells_every_must_and_ends_with_1_where_one_is_missed(tmp_pa
     assert run("outside", "--dir", tmp_path).returncode == 0
     text = (tmp_path / "musts.md").read_text()
     assert text.startswith("7 of 7 bounds hold, 0 are missed.") and "| coverage of the 90 % interval near |" in text
-    assert "over that of fixed strengths: no table of it" in text
+    assert "over that of fixed strengths: no rows of the same surgeries" in text
     assert not (tmp_path / "outside-reliability.png").exists()
     (tmp_path / "rows-h.csv").write_text(text_of(every(rows, far_coverage_90=0.5)))
     fixed = tmp_path / "fixed.csv"
