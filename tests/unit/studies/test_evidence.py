@@ -87,6 +87,11 @@ def test_the_craniotomy_is_bound_with_its_own_data_and_without_them():
     assert verdict(rows, f"gap: {alone}") == "" and verdict(rows, f"gap: {joint}") == "1"
 
 
+def ratio_of(rows, column):
+    return evidence.over_fixed({(boundary, data): table_of(rows).where(boundary=boundary, data=data)
+                                for boundary in ("contact", "fixed") for data in ("tumour", "tumour+cortex")}, column)
+
+
 def test_contact_must_not_be_worse_than_fixed_in_ratio_over_patients():
     name, rows = "gap: craniotomy CPPD with contact over that of fixed", good("gap")
     assert verdict(rows, name) == "1"
@@ -96,15 +101,16 @@ def test_contact_must_not_be_worse_than_fixed_in_ratio_over_patients():
     rows = of(of(rows, {"cppd_mm": 5}, boundary="fixed", patient=1), {"cppd_mm": 4}, boundary="contact", patient=1)
     rows = of(of(rows, {"cppd_mm": 0.1}, boundary="fixed", patient=2), {"cppd_mm": 0.2}, boundary="contact", patient=2)
     assert verdict(rows, name) == "0"
-    interval = evidence.over_fixed({(boundary, data): table_of(rows).where(boundary=boundary, data=data)
-                                    for boundary in ("contact", "fixed") for data in ("tumour", "tumour+cortex")}, "cppd_mm")
+    interval = ratio_of(rows, "cppd_mm")
     assert interval.mean == pytest.approx((0.8 * 2) ** 0.5) and interval.count == 2
 
 
 def test_a_surgery_that_one_boundary_refused_counts_in_neither():
-    rows = good("gap")
-    rows[0] = {**rows[0], "tumour_mm": ""}
     name = "gap: tumour error with contact over that of fixed"
+    for refused, other in (("fixed", "contact"), ("contact", "fixed")):
+        rows = of(good("gap"), {"tumour_mm": ""}, boundary=refused, data="tumour", seed=1)
+        assert len({ratio_of(of(rows, {"tumour_mm": error}, boundary=other, data="tumour", seed=1), "tumour_mm").mean
+                    for error in (0.001, 100)}) == 1
     assert verdict(rows, name) == "1"
     assert verdict([row for row in rows if row["patient"] == 1 or row["boundary"] == "contact"], name) is None
 
