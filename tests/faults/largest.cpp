@@ -63,7 +63,7 @@ Points filled(const Points& cloud, int count, std::mt19937& random) {
 }
 
 // The largest of each body, every one of a source of its own. Points are those of the recording and
-// between them, so that nothing but their number is unusual; triangles are the brain's, cut smaller.
+// between them, so that nothing but their number is unusual; triangles are the brain's, cut up.
 std::vector<Observation> largest(const Feed& feed, const BrainModel& model, std::uint32_t seed) {
   std::mt19937 random(seed);
   std::vector<Observation> made;

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// What the tests and the library that they preload into a daemon (fault_shim.cpp) share: a file that
-// both have mapped.
+// What the tests and the library that they preload into a daemon (fault_shim.cpp) share: a file
+// that both have mapped.
 #pragma once
 
 #include <atomic>

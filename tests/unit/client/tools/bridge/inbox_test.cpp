@@ -324,8 +324,8 @@ TEST_F(InboxSweep, TheNextSweepEndsTheOneBeforeAndCountsItsOwnImages) {
   EXPECT_THAT(taken.found, SizeIs(1));
 }
 
-// Images are skipped, in colour, twice or late; the bridge connects late; the sender stops and begins
-// anew: no contour comes to lie on another image.
+// Images are skipped, in colour, twice or late; the bridge connects late; the sender stops and
+// begins anew: no contour comes to lie on another image.
 TEST_F(InboxSweep, In200RandomStreamsEveryContourIsOnItsOwnImage) {
   write_contours();
   constexpr std::uint32_t kStreams = 200;
