@@ -166,7 +166,7 @@ TEST(Metrics, HistogramsAreCumulativeAndAgreeWithTheirCount) {
 }
 
 TEST(Metrics, SayWhetherTheFieldIsAgedOrHasExpired) {
-  DaemonReport report = sample_report();
+  wire::DaemonReport report = sample_report();
   report.session.aged_after_ms = 2000;
   report.session.expired_after_ms = 4000;
   for (const double state : {0.0, 1.0, 2.0}) {
