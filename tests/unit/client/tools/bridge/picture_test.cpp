@@ -101,6 +101,12 @@ TEST(ShownState, TheStatusIsOkForACurrentUsableFieldAlone) {
     EXPECT_EQ(to_status(state).text, "no word");
     EXPECT_TRUE(igtl::validate(to_status(state)));
   }
+  ShownState caution = current();
+  EXPECT_EQ(to_status(caution).text, "");
+  caution.quality = "caution";
+  caution.flags = "deadline";
+  EXPECT_EQ(to_status(caution).code, igtl::kStatusOk);
+  EXPECT_EQ(to_status(caution).text, "caution: deadline");
   ShownState recorded = current();
   recorded.recorded = true;
   EXPECT_EQ(to_status(recorded).code, igtl::kStatusNotReady);
