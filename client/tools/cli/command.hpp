@@ -35,6 +35,7 @@ void add_stereo(CLI::App& app, Status& status);
 void add_journal(CLI::App& app, Status& status);
 void add_export(CLI::App& app, Status& status);
 void add_watch(CLI::App& app, Status& status);
+void add_advise(CLI::App& app, Status& status);
 void add_view(CLI::App& app, Status& status);
 void add_status(CLI::App& app, Status& status);
 void add_top(CLI::App& app, Status& status);

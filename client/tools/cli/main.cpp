@@ -19,7 +19,8 @@ int main(int argc, char** argv) {
       "surgeries with known truth, "
       "replay recorded ones to brainshiftd, and report how well the deformation was recovered; "
       "solve single forward problems on any mesh; import recordings of tracked ultrasound and "
-      "landmarks; register patients by fiducials; check, export and mend journals; watch a "
+      "landmarks; register patients by fiducials; check, export and mend journals; say what to "
+      "measure next; watch a "
       "running brainshiftd; make keys.\n"
       "Research software for simulation, replay and laboratory use; no medical device.",
       "brainshift"};
@@ -41,8 +42,8 @@ int main(int argc, char** argv) {
        {client::add_init, client::add_preview, client::add_simulate, client::add_replay,
         client::add_report, client::add_solve, client::add_import, client::add_register,
         client::add_stereo, client::add_journal, client::add_export, client::add_watch,
-        client::add_view, client::add_bridge, client::add_status, client::add_top,
-        client::add_keys}) {
+        client::add_view, client::add_advise, client::add_bridge, client::add_status,
+        client::add_top, client::add_keys}) {
     add(app, status);
   }
 
@@ -54,7 +55,7 @@ int main(int argc, char** argv) {
         "unknown command \"" + std::string(argv[1]) +
         "\": must be init, preview, simulate, replay, report, solve, import, register, "
         "stereo, journal, export, "
-        "watch, view, bridge, status, top or keys (see brainshift --help)");
+        "watch, view, advise, bridge, status, top or keys (see brainshift --help)");
     return kExitBadInput;
   }
   try {

@@ -56,6 +56,18 @@ struct CondensedOptions {
   int threads = 0;  // 0: as many as cores
 };
 
+// What is left unknown of the loads after an update: modes z with covariance F F^T, and with them
+//   Cov(u) = V F F^T V^T + left out,   V = U - G_A T
+// given the active set A. A copy: it stays as it is when the inverter goes on.
+struct PosteriorModes {
+  std::shared_ptr<const CondensedOperators> operators;
+  int first_mode = 0;        // column of U that z[0] belongs to
+  Eigen::MatrixXd factor;    // F, r x r, lower
+  std::vector<int> active;   // A, slaves
+  Eigen::MatrixXd contact;   // T, k x r, N
+  Eigen::VectorXd left_out;  // kRemainders factors of truncated_variance_mm2
+};
+
 class CondensedInverter {
  public:
   // Keeps references to nothing but what it shares. kInvalidArgument when operators and locator
@@ -83,6 +95,7 @@ class CondensedInverter {
   VecX weights() const;
   // Of the last update().
   const UpdateProfile& profile() const;
+  PosteriorModes posterior() const;
 
  private:
   struct Impl;
