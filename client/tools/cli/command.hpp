@@ -66,6 +66,8 @@ auto add_required(App& command, const char* name, Value& value, const char* help
 // Prints a line to stdout, and lets nothing wait in a buffer.
 void print_line(const std::string& line);
 void print_lines(const std::vector<std::string>& lines);
+// The last line of a command that wrote a file: "wrote PATH", and what else it says of it.
+void print_wrote(const std::filesystem::path& path, const std::string& more = "");
 // Prints "brainshift: <sentence>" to stderr, line breaks replaced by spaces.
 void print_error(std::string_view sentence);
 

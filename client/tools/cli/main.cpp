@@ -1,13 +1,16 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
+#include <fmt/format.h>
 #include <sys/stat.h>
 
 #include <CLI/CLI.hpp>
 #include <algorithm>
 #include <exception>
 #include <string>
+#include <vector>
 
 #include "client/tools/cli/command.hpp"
 #include "common/core/exit_status.hpp"
+#include "common/io/files/command_words.hpp"
 #include "common/linalg/openblas.hpp"
 
 int main(int argc, char** argv) {
@@ -51,11 +54,16 @@ int main(int argc, char** argv) {
   const auto commands = app.get_subcommands(nullptr);
   const auto named = [&](const CLI::App* command) { return command->check_name(argv[1]); };
   if (argc > 1 && argv[1][0] != '-' && std::none_of(commands.begin(), commands.end(), named)) {
-    client::print_error(
-        "unknown command \"" + std::string(argv[1]) +
-        "\": must be init, preview, simulate, replay, report, solve, import, register, "
-        "stereo, journal, export, "
-        "watch, view, advise, bridge, status, top or keys (see brainshift --help)");
+    const std::string typed = argv[1];
+    if (typed == "prepare" || typed == "serve" || typed == "health")
+      io::become("brainshiftd", argv);
+    std::vector<std::string> names;
+    for (const CLI::App* command : commands) names.push_back(command->get_name());
+    const std::string meant = io::nearest_word(typed, names);
+    client::print_error("unknown command \"" + typed + "\"" +
+                        (meant.empty() ? "" : ", did you mean " + meant + "?") +
+                        ": must be one of " + fmt::format("{}", fmt::join(names, ", ")) +
+                        " (see brainshift --help), or of brainshiftd's: prepare, serve, health");
     return kExitBadInput;
   }
   try {

@@ -7,6 +7,7 @@
 
 #include "client/tools/view/page_files.hpp"
 #include "common/geometry/surface.hpp"
+#include "common/geometry/tumour_motion.hpp"
 
 namespace brainshift::client {
 namespace {
@@ -64,9 +65,9 @@ HistoryPoint history_point(const UpdateMessage& message, const std::vector<NodeI
   point.quality = message.error ? "failed" : std::string(to_string(estimate.quality.quality));
   if (message.error || !update.usable()) return point;
   point.misfit_mm = estimate.misfit_mm.mean;
-  if (tumour.empty() || tumour.back() >= estimate.displacement.cols()) return point;
-  point.motion_mm = estimate.displacement(Eigen::all, tumour).colwise().norm().mean();
-  if (estimate.sd_mm.size() > 0) point.motion_sd = estimate.sd_mm(tumour).mean();
+  const auto motion = geometry::tumour_motion(update, tumour);
+  if (motion) point.motion_mm = motion->mm;
+  if (motion) point.motion_sd = motion->sd_mm.value_or(kNoNumber);
   return point;
 }
 
