@@ -355,7 +355,7 @@ std::vector<Figure> slice_figures(const RunGroup& group, const std::vector<Repor
              ".",
          map_sheet(
              scene, [](const Estimated& e) { return e.known; },
-             map_of("What the data know", "share of the variance taken away", 1.0))});
+             map_of("What the data know", "share of the sd taken away", 1.0))});
   }
   if (scene.truth == nullptr) return figures;
   figures.push_back({"difference-" + group.name + ".png",
