@@ -323,7 +323,7 @@ class Update:
     error_code: str  # set when status is "failed"
     displacement_mm: Optional[Singles]  # (n, 3)
     sd_mm: Optional[Singles]  # (n,)
-    known: Optional[Singles]  # (n,): share of the variance that the data took away; 0: a guess, 1: known
+    known: Optional[Singles]  # (n,): share of the standard deviation that the data took away; 0: a guess, 1: known
     nodes: Optional[Indices]  # of the mesh that the rows are of; None: all, in order
     mesh_nodes: Optional[int]  # nodes of the whole mesh, with `nodes`
     quality: Quality

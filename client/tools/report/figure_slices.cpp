@@ -363,7 +363,7 @@ std::vector<Figure> slice_figures(const RunGroup& group, const std::vector<Repor
           &Estimated::sd_mm,
           map_of("Standard deviation of the estimate", "standard deviation (mm)"));
   add_map("known-", "Where the field is known: 1, the data say it; 0, it is a guess of the prior; ",
-          &Estimated::known, map_of("What the data know", "share of the variance taken away", 1.0));
+          &Estimated::known, map_of("What the data know", "share of the sd taken away", 1.0));
   if (scene.truth == nullptr) return figures;
   figures.push_back({"difference-" + group.name + ".png",
                      "True displacement, and estimated minus true, magnified as its title says; " +

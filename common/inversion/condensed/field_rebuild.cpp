@@ -346,7 +346,8 @@ void FieldRebuild::known(ThreadTeam& team, const linalg::blas::In<double>& expla
       const double all =
           static_cast<double>(prior) + 3.0 * operators_.truncated_variance_mm2.row(i).sum();
       const double taken = static_cast<double>(seen.middleRows<3>(3 * i).squaredNorm());
-      control_known_[i] = all > 0.0 ? std::clamp(taken / all, 0.0, 1.0) : 0.0;
+      control_known_[i] =
+          all > 0.0 ? 1.0 - std::sqrt(std::clamp(1.0 - taken / all, 0.0, 1.0)) : 0.0;
     }
   });
   interpolate(team, control_known_, known);

@@ -5,7 +5,7 @@
 //   u = U z + G_A f                                            every node, single precision
 //   Cov(u) = V Cov(z) V^T + left out,   V = U - G_A T           at the control nodes, interpolated
 //                                                               to the others
-//   known = 1 - Cov_0(u) / Cov_0(u without data), traces, Cov_0: of the broad hypothesis
+//   known = 1 - sqrt(Cov_0(u) / Cov_0(u without data)), traces, Cov_0: of the broad hypothesis
 //
 // sd of a node: root mean square of its three components' standard deviations. Given the active
 // set: which slaves touch is taken as known.

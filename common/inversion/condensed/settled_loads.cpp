@@ -22,7 +22,7 @@ constexpr double kSameVariance = 0.1;
 // By how much the displacement of a brain differs whose tissue is 30 % stiffer here and softer
 // there than the case says, as a part of the displacement: 0.09 to 0.15 in sag, 0.07 to 0.28 where
 // tissue swells (decisions 0018, 0037). The first value counts before any load is known.
-constexpr double kModelError = 0.1, kModelErrorOfVolume = 0.2;
+constexpr double kModelError = 0.1, kModelErrorOfVolume = 0.3;
 constexpr bool is_volume(PriorPart part) {
   return part == PriorPart::kTumourVolume || part == PriorPart::kBrainVolume;
 }
