@@ -174,12 +174,12 @@ void FieldRebuild::gather_terms(const VecX& z, const ContactAtLoads& contact) {
   }
 }
 
-void FieldRebuild::sum_blocks(ThreadTeam& team, const std::vector<int>& blocks) {
+void FieldRebuild::sum_blocks(ThreadTeam& team, const std::vector<int>& blocks, float omitted_mm) {
   team.split(static_cast<long>(blocks.size()), [&](long begin, long end) {
     for (long i = begin; i < end; ++i) {
       const int block = blocks[static_cast<std::size_t>(i)];
-      operators_.responses.sum(block, terms_,
-                               field_.data() + 3L * operators_.responses.first_node(block));
+      operators_.responses.sum(
+          block, terms_, field_.data() + 3L * operators_.responses.first_node(block), omitted_mm);
     }
   });
 }
@@ -205,7 +205,7 @@ void FieldRebuild::displacement_at(ThreadTeam& team, const std::vector<NodeIndex
     if (!has) some_blocks_.push_back(block);
     has = 1;
   }
-  sum_blocks(team, some_blocks_);
+  sum_blocks(team, some_blocks_, 0.0F);
   for (std::size_t i = 0; i < nodes.size(); ++i) {
     u.col(static_cast<Eigen::Index>(i)) = field_.segment<3>(place(nodes[i])).cast<double>();
   }
@@ -215,7 +215,7 @@ void FieldRebuild::displacement(ThreadTeam& team, const VecX& z, const ContactAt
                                 Points& u) {
   u.resize(3, operators_.num_nodes());
   gather_terms(z, contact);
-  sum_blocks(team, blocks_);
+  sum_blocks(team, blocks_, kOmitted_mm);
   far_field_error_mm_ = 0.0;
   if (!far_.empty()) {
     sum_spare(team);
