@@ -117,6 +117,7 @@ class FieldRebuild {
   // Control nodes: rows of U and G, V, and what a set needs of them.
   Eigen::MatrixXf control_modes_, control_contact_, response_, factor_, conditioned_, spread_;
   Eigen::VectorXf prior_squares_;              // variances of the modes, r
+  Eigen::VectorXf squares_, prior_at_;         // of the control nodes' rows: |row|^2
   std::unique_ptr<float[]> explained_, seen_;  // X^T, and V X^T
   std::unique_ptr<float[]> contact_storage_;
   VecX control_variance_, control_known_;
