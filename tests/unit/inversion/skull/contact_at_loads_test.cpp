@@ -248,6 +248,24 @@ TEST(ContactAtLoads, SolvesContactWhereExchangesGoInCircles) {
   EXPECT_GT(longest, ContactAtLoads::kPlainSets) << "the test shows nothing";
 }
 
+TEST(ContactAtLoads, ASearchThatIsGivenUpLeavesTheSolutionThatItKept) {
+  const CondensedOperators brain = skull_operators(0.5);
+  Search search(brain);
+  const VecX z = skull_loads(6, 1.0), other = skull_loads(7, 3.0);
+  ASSERT_EQ(value_or_fail(search.at_loads.solve(z)), true);
+  search.at_loads.keep();
+  const std::vector<int> active = search.at_loads.active();
+  int asked = 0;
+  const auto third = [&asked] { return ++asked > 2; };
+  EXPECT_FALSE(value_or_fail(search.at_loads.solve(other, third)));
+  EXPECT_EQ(search.at_loads.sets(), 2);
+  search.at_loads.return_to_kept();
+  EXPECT_EQ(search.at_loads.active(), active);
+  expect_solution(brain, z, search.at_loads);
+  EXPECT_TRUE(value_or_fail(search.at_loads.solve(other)));
+  expect_solution(brain, other, search.at_loads);
+}
+
 TEST(ContactAtLoads, ReturnsToTheSolutionThatItKept) {
   const CondensedOperators brain = skull_operators(0.5);
   Search search(brain);
