@@ -82,8 +82,8 @@ class CondensedInverter {
 
   // Writes every member of `estimate` in place, reusing its memory. An error leaves it as it was,
   // but for status kNotRun when the rebuilt field is what is wrong. asked.moving: data that follow
-  // the deformation. asked.stop: looked at before every step; the deadline of the case is something
-  // else: it ends with the best iterate and status kDeadline. Errors: as check_data;
+  // the deformation. asked.stop: looked at before every step and every set of contact; the deadline
+  // of the case is something else: it ends with the best iterate and status kDeadline. Errors: as check_data;
   // kInvalidArgument for data outside the brain (the sentence names the datum); stopped();
   // kNotFinite when the result is not finite; kNotConverged when the field contradicts its contact
   // forces (estimate_check.hpp).
