@@ -83,10 +83,10 @@ class CondensedInverter {
   // Writes every member of `estimate` in place, reusing its memory. An error leaves it as it was,
   // but for status kNotRun when the rebuilt field is what is wrong. asked.moving: data that follow
   // the deformation. asked.stop: looked at before every step and every set of contact; the deadline
-  // of the case is something else: it ends with the best iterate and status kDeadline. Errors: as check_data;
-  // kInvalidArgument for data outside the brain (the sentence names the datum); stopped();
-  // kNotFinite when the result is not finite; kNotConverged when the field contradicts its contact
-  // forces (estimate_check.hpp).
+  // of the case is something else: it ends with the best iterate and status kDeadline. Errors: as
+  // check_data; kInvalidArgument for data outside the brain (the sentence names the datum);
+  // stopped(); kNotFinite when the result is not finite; kNotConverged when the field contradicts
+  // its contact forces (estimate_check.hpp).
   Status update(const SparseData& data, Estimate& estimate, const InversionOptions& asked = {});
   // Of the last update(), for the parts that the options leave out.
   const OmissionErrors& omission_errors() const;

@@ -419,9 +419,8 @@ TEST(LoadModes, VentriclesLieOnBothSides) {
   const double kappa = bulk_modulus(config.material);
   for (int j = 0; j < 6; ++j) {
     const Vec3 place(j < 3 ? 0.4 : 0.6, 0.35 + 0.15 * (j % 3), 0.55);
-    const double expected =
-        0.05 * expected_work(patient, low + place.cwiseProduct(extent) - tumour, 0.1 * extent.y(),
-                             [&](double) { return kappa; });
+    const double expected = 0.05 * expected_work(patient, low + place.cwiseProduct(extent) - tumour,
+                                                 0.1 * extent.y(), [&](double) { return kappa; });
     EXPECT_NEAR(mode(modes.columns, j).cwiseProduct(nodes).sum(), expected,
                 1e-9 * std::abs(expected));
   }
