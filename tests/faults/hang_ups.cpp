@@ -71,7 +71,7 @@ struct Counts {
   int connections = 0, aborts = 0, unanswered = 0;
 };
 
-void look(DaemonProcess& daemon, Counts& counts) {
+void check_it_answers(DaemonProcess& daemon, Counts& counts) {
   counts.aborts += daemon.runs() ? 0 : 1;
   if (daemon.runs()) counts.unanswered += answered_within_s(daemon.endpoint()) > 2.0 ? 1 : 0;
 }
@@ -142,7 +142,7 @@ void run_hang_ups(const Settings& settings, Tally& tally) {
       Counts counts;
       run(daemon, settings.count, counts);
       // With keys nobody but the holder of one is answered, and its status.
-      if (!keys) look(daemon, counts);
+      if (!keys) check_it_answers(daemon, counts);
       const std::string what = std::string(name) + with;
       tally.at_least("connections: " + what, counts.connections, settings.count);
       tally.equals("aborts: " + what, counts.aborts, 0);

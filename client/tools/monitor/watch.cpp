@@ -65,6 +65,7 @@ using std::chrono::milliseconds;
 // How long a line waits for the daemon to say how old its field is.
 constexpr milliseconds kForItsAge{20};
 constexpr milliseconds kBetweenLooks{250};
+constexpr std::size_t kColumns = 80;  // of a terminal
 
 nlohmann::json number_or_null(double value) {
   if (std::isfinite(value)) return value;
@@ -98,13 +99,13 @@ std::string json_line(const WatchedUpdate& update) {
 // Further lines below a line, broken between words.
 std::string continued(const std::string& given) {
   const std::string text = one_line(given, '?');
-  constexpr std::size_t kColumns = 78;
+  constexpr std::size_t kWidth = kColumns - 2;
   std::string lines;
   for (std::size_t from = 0; from < text.size();) {
     std::size_t to = text.size();
-    if (to - from > kColumns) {
-      to = text.rfind(' ', from + kColumns);
-      if (to == std::string::npos || to <= from) to = from + kColumns;
+    if (to - from > kWidth) {
+      to = text.rfind(' ', from + kWidth);
+      if (to == std::string::npos || to <= from) to = from + kWidth;
     }
     lines += "\n  " + text.substr(from, to - from);
     from = to < text.size() && text[to] == ' ' ? to + 1 : to;
@@ -251,9 +252,11 @@ std::string watch_line(const WatchedUpdate& update, bool json) {
     return line + continued(update.failure) + continued(update.status.reason);
   }
   line += "  " + motion_text(update.tumour);
-  line +=
-      fmt::format("  {}, {}, {}{}", update.quality, update.boundary,
-                  to_string(update.status.currency), update.status.recorded ? ", RECORDED" : "");
+  line += fmt::format("  {}, {}", update.quality, update.boundary);
+  const std::string status = fmt::format("{}{}", to_string(update.status.currency),
+                                         update.status.recorded ? ", RECORDED" : "");
+  const bool fits = line.size() + 2 + status.size() <= kColumns;
+  line += fits ? ", " + status : continued(status);
   if (!update.doubt.empty()) line += continued(update.quality + ": " + update.doubt);
   if (!update.status.reason.empty()) {
     line +=

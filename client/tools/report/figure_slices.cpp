@@ -58,8 +58,10 @@ double largest_in_plane(const SliceSamples& samples, const Points& field,
   return largest;
 }
 
+// 0 where a boundary has no such field.
 double largest_on(const SliceSamples& samples, const Points& field) {
   double largest = 0.0;
+  if (field.cols() == 0) return largest;
   for (const auto& location : samples.locations)
     largest = std::max(largest, geometry::value_at(location, field).norm());
   return largest;

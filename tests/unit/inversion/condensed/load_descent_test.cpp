@@ -281,7 +281,9 @@ TEST_F(LoadDescentTest, WhenTimeIsOverTheLoadsStayWithTheirContact) {
   const SparseData data = swelling_data(*patient(), toy.operators->region, 2.0, 3);
   toy.find(data);
   const VecX loads = toy.descent.most_probable();
-  toy.sampled.sample(data, RemainderVariances::Ones(), VecX::Constant(data.size(), 0.01));
+  // Far from where the loads are:
+  const SparseData next = swelling_data(*patient(), toy.operators->region, 6.0, 3);
+  toy.sampled.sample(next, RemainderVariances::Ones(), VecX::Constant(data.size(), 0.01));
   ASSERT_TRUE(toy.descent.take(toy.sampled));
   const std::vector<int> active = toy.descent.contact().active();
   ASSERT_FALSE(active.empty());

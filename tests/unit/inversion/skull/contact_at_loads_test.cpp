@@ -98,7 +98,7 @@ struct Skull {
 
 // Without a gap most slaves press.
 class ContactReachOf : public testing::TestWithParam<double> {};
-INSTANTIATE_TEST_SUITE_P(Gaps, ContactReachOf, testing::Values(0.5, -4.0));
+INSTANTIATE_TEST_SUITE_P(Gaps, ContactReachOf, testing::Values(0.5, -12.0));
 
 TEST_P(ContactReachOf, EndsWhereSoManySlavesOfTheLinearModelHaveChanged) {
   Skull skull(true, GetParam());

@@ -131,6 +131,7 @@ TEST(Metrics, EveryFamilyHasHelpATypeAndAUnitInItsName) {
                                               "brainshift_model_ready",
                                               "brainshift_worker_hangs",
                                               "brainshift_session_phase",
+                                              "brainshift_field_aged",
                                               "brainshift_clients",
                                               "brainshift_viewers",
                                               "brainshift_viewers_behind",

@@ -22,7 +22,7 @@ LandmarkPairs one_that_differs(int count) {
   return pairs;
 }
 
-RecordedObservation observed(const std::string& source, decltype(Observation::body) body) {
+RecordedObservation observed_by(const std::string& source, decltype(Observation::body) body) {
   RecordedObservation recorded;
   recorded.observation.source = source;
   recorded.observation.sequence = 41;
@@ -48,7 +48,7 @@ ScriptedDaemon mean_daemon() {
 TEST(LeaveOneOut, NothingOfALandmarkIsReadToPredictIt) {
   ScriptedDaemon daemon = mean_daemon();
   const auto scores = value_or_fail(leave_one_out(
-      daemon.link(), kOptions, {observed("tracks", one_that_differs(6))}, box_model()));
+      daemon.link(), kOptions, {observed_by("tracks", one_that_differs(6))}, box_model()));
   ASSERT_EQ(scores.size(), 1u);
   const LeftOutScore& score = scores[0];
   EXPECT_EQ(score.source, "tracks");
@@ -69,7 +69,7 @@ TEST(LeaveOneOut, AFieldThatIsNotUsableLeavesItsLandmarkUnscored) {
     return ++answers == 2 ? std::vector{unusable_update(observation.sequence)} : well(observation);
   };
   const auto scores = value_or_fail(leave_one_out(
-      daemon.link(), kOptions, {observed("tracks", one_that_differs(6))}, box_model()));
+      daemon.link(), kOptions, {observed_by("tracks", one_that_differs(6))}, box_model()));
   ASSERT_EQ(scores.size(), 1u);
   EXPECT_EQ(scores[0].points, 5);
   EXPECT_EQ(scores[0].failed, 1);
@@ -79,10 +79,10 @@ TEST(LeaveOneOut, AFieldThatIsNotUsableLeavesItsLandmarkUnscored) {
 TEST(LeaveOneOut, FewLandmarksHaveNoScoreAndSilenceIsAnError) {
   ScriptedDaemon daemon = mean_daemon();
   const auto scores = leave_one_out(daemon.link(), kOptions,
-                                    {observed("tracks", one_that_differs(4))}, box_model());
+                                    {observed_by("tracks", one_that_differs(4))}, box_model());
   EXPECT_TRUE(value_or_fail(scores).empty());
   daemon.script = [](const Observation&) { return std::vector<UpdateMessage>{}; };
-  refusal_of(leave_one_out(daemon.link(), kOptions, {observed("tracks", one_that_differs(6))},
+  refusal_of(leave_one_out(daemon.link(), kOptions, {observed_by("tracks", one_that_differs(6))},
                            box_model()),
              ErrorCode::kUnavailable);
 }
@@ -101,7 +101,7 @@ TEST(LeaveOneOut, BoundaryPointsArePredictedAnOctantAtATime) {
     return std::vector{answer};
   };
   const auto scores =
-      value_or_fail(leave_one_out(daemon.link(), kOptions, {observed("ius", boundary)}, model));
+      value_or_fail(leave_one_out(daemon.link(), kOptions, {observed_by("ius", boundary)}, model));
   ASSERT_EQ(scores.size(), 1u);
   EXPECT_EQ(scores[0].kind, "tumour boundary");
   EXPECT_EQ(scores[0].points, boundary.points.cols());
