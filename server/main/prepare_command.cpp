@@ -40,6 +40,12 @@ struct Outcome {
   double total_s = 0.0;
 };
 
+// Of the whole preparation: patient::prepare_model puts the boundary before what it does for it.
+std::string_view step_of(std::string_view stage) {
+  if (stage.starts_with(to_string(Boundary::kFixed))) return "step 2 of 4";
+  return stage.starts_with(to_string(Boundary::kContact)) ? "step 3 of 4" : "step 1 of 4";
+}
+
 // Of this process so far.
 Usage usage_of(const Ranks::Traffic& traffic) {
   rusage usage{};
@@ -89,7 +95,11 @@ Result<Outcome> prepare(const PrepareArguments& arguments, ProgressBar& bar) {
   const bool first = arguments.ranks == nullptr || arguments.ranks->rank() == 0;
   options.ranks = arguments.ranks;
   options.threads = arguments.threads;
-  if (first) options.progress = bar.progress("");
+  if (first) {
+    options.progress = [&bar](std::string_view stage, double fraction) {
+      bar.show(step_of(stage), stage, fraction);
+    };
+  }
   options.on_resume = [&] {
     bar.note(fmt::format("going on from {} of an interrupted run", options.checkpoint.string()));
   };
@@ -102,7 +112,7 @@ Result<Outcome> prepare(const PrepareArguments& arguments, ProgressBar& bar) {
   }
   Status written;
   if (first) {
-    bar.show("", "write model", 1.0);
+    bar.show("step 4 of 4", "write model", 1.0);
     written = io::write_model(arguments.out, prepared->file);
   }
   if (auto ok = agreed(written); !ok) return tl::unexpected(ok.error());
