@@ -246,6 +246,18 @@ void add_opening(const BrainModel& model, const PriorConfig& prior, Columns& out
   }
 }
 
+void add_ventricles(const BrainModel& model, const PriorConfig& prior, Columns& out) {
+  if (prior.ventricle_pressure_sd_pa == 0.0 || model.ventricle_wall.cols() == 0) return;
+  const double middle =
+      0.5 * (model.mesh.nodes.row(0).minCoeff() + model.mesh.nodes.row(0).maxCoeff());
+  const auto add = [&](const auto& pressure) {
+    out.add(PriorPart::kVentricles, units::stress_from_pa(prior.ventricle_pressure_sd_pa),
+            fem::wall_pressure_load(model.mesh.nodes, model.ventricle_wall, pressure));
+  };
+  add([](const Vec3&) { return 1.0; });
+  add([&](const Vec3& x) { return std::tanh((x.x() - middle) / kMidlineWidth_mm); });
+}
+
 }  // namespace
 
 Result<LoadModes> load_modes(const BrainModel& model, const CaseConfig& config) {
@@ -258,6 +270,7 @@ Result<LoadModes> load_modes(const BrainModel& model, const CaseConfig& config) 
   add_brain_volume(model, config.prior, of_tet, columns);
   add_resection(model, config, columns);
   add_opening(model, config.prior, columns);
+  add_ventricles(model, config.prior, columns);
   return columns.modes();
 }
 

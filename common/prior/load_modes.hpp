@@ -27,6 +27,9 @@
 //                          middle and kBumpsOfRing around it, at kRing of its half axes, Gaussians
 //                          with standard deviations of kBumpWidth of them. What pulls or presses
 //                          there, a spatula or dura that gives way, does not do so all over
+//   ventricles             pressure on the wall of the ventricles, pressing the tissue outwards: the
+//                          same all over, and tanh(x / kMidlineWidth_mm) of the distance x from the
+//                          brain's middle to the right: fluid is drained from one of the two
 // Swelling honours the stiffness of tumour and regions (contact::tissue_map). All families have
 // zero mean and their columns are independent.
 #pragma once

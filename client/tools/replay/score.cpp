@@ -166,6 +166,9 @@ void describe(const BrainModel& model, const Estimate& estimate, RunReport& run)
   run.reason = estimate.reason;
   run.contact = estimate.contact;
   if (!std::isnan(estimate.region_known)) run.region_known = estimate.region_known;
+  if (!std::isnan(estimate.ventricle_change_mm3)) {
+    run.ventricle_change_cc = estimate.ventricle_change_mm3 / 1000.0;
+  }
   run.error_mm.sparse_initial = estimate.initial_misfit_mm;
   run.error_mm.sparse = estimate.misfit_mm;
   run.principal_direction_deg = angle_to_gravity(estimate.displacement, model.gravity_direction);
