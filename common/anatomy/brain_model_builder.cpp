@@ -272,7 +272,7 @@ Septa septa_of(const geometry::SlitMesh& cut, const std::vector<NodeIndex>& fixe
 }
 
 void tell_anatomy(const geometry::SlitMesh& cut, const std::string& what, Notes* notes) {
-  const double septa_mm2 = geometry::area({cut.mesh.nodes, cut.sheets});
+  const double septa_mm2 = 0.5 * geometry::area({cut.mesh.nodes, cut.sheets});
   const double ventricles_mm3 = -geometry::enclosed_volume({cut.mesh.nodes, cut.wall});
   add_note(notes,
            fmt::format("{}: falx and tentorium of {:.0f} cm2 with {} nodes that may touch "

@@ -67,7 +67,7 @@ std::array<Edge, 3> edges_of(const Facet& f) {
   return {{{f[0], f[1]}, {f[0], f[2]}, {f[1], f[2]}}};
 }
 
-// geometry::Facets of one septum without teeth and islands. rim: edges of the outer surface, which hold a
+// The facets of one septum without teeth and islands. rim: edges of the outer surface, which hold a
 // facet as a neighbour does.
 geometry::Facets without_teeth_and_islands(geometry::Facets facets, const Points& nodes,
                                            const std::vector<Edge>& rim, const char* name,

@@ -183,13 +183,16 @@ SlitMesh cut_mesh(const TetMesh& mesh, const std::vector<char>& taken, const Fac
     const auto found = std::lower_bound(slit.begin(), slit.end(), faces[f].nodes);
     if (found == slit.end() || *found != faces[f].nodes) continue;
     const auto given = std::find(facets.begin(), facets.end(), *found) - facets.begin();
+    const Facet one = renamed(mesh, cut, sides[0], faces[f].nodes);
+    const Facet other = renamed(mesh, cut, sides[1], faces[f].nodes);
+    if (one == other) continue;
     for (const int tet : sides) {
-      const Facet facet = turned_out(cut, tet, renamed(mesh, cut, tet, faces[f].nodes));
-      if (tet == sides[0]) sheets.push_back(facet);
+      const Facet& mine = tet == sides[0] ? one : other;
+      sheets.push_back(turned_out(cut, tet, mine));
       for (std::size_t k = 0; k < 3; ++k) {
-        if (result.copies[at(old_of[at(facet[k])])].size() < 2) continue;
-        into.try_emplace({group_of[static_cast<std::size_t>(given)], facet[k]}, Vec3::Zero())
-            .first->second -= facet_area(cut.nodes, facet);
+        if (one[k] == other[k]) continue;
+        into.try_emplace({group_of[static_cast<std::size_t>(given)], mine[k]}, Vec3::Zero())
+            .first->second -= facet_area(cut.nodes, sheets.back());
       }
     }
   }

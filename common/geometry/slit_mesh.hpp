@@ -21,7 +21,7 @@ struct SlitMesh {
   Eigen::Matrix<int, 3, Eigen::Dynamic> outer;
   // Between a tetrahedron that stays and one that went: out of the first.
   Eigen::Matrix<int, 3, Eigen::Dynamic> wall;
-  // The facets that are open, on one of their sides.
+  // The facets that are open, on either side: out of its tissue.
   Eigen::Matrix<int, 3, Eigen::Dynamic> sheets;
   // Nodes on either side of a slit, and the unit normals there into the tissue of that side: the
   // area-weighted mean over the facets of one group. A node of two groups is there twice; nodes of

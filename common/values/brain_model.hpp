@@ -31,7 +31,7 @@ struct Septa {
   std::vector<NodeIndex> slaves;
   Points normals = Points(3, 0);  // per slave: unit, from the sheet into its tissue
   double gap_mm = 0.0;            // between sheet and slave before surgery
-  // The sheets as triangles between the nodes of one side; for pictures.
+  // The sheets as triangles between the nodes of each side, oriented out of its tissue.
   Eigen::Matrix<int, 3, Eigen::Dynamic> triangles = Eigen::Matrix<int, 3, Eigen::Dynamic>(3, 0);
 };
 

@@ -54,7 +54,8 @@ Status score_craniotomy(const BrainModel& model, const io::SurgeryTruth& truth,
   error.craniotomy_displacement = mean_std_of_norms(moved - moved_truly);
 
   std::vector<NodeIndex> node_of_vertex;
-  TriangleSurface deformed = geometry::boundary_surface(model.mesh, &node_of_vertex);
+  TriangleSurface deformed =
+      geometry::surface_of(model.mesh.nodes, model.boundary_triangles, &node_of_vertex);
   deformed.vertices += truth.displacement(Eigen::all, node_of_vertex);
   const auto surface = geometry::ClosestPointIndex::build(deformed);
   if (!surface) return tl::unexpected(surface.error());

@@ -119,10 +119,10 @@ TEST(Regions, TheSlitLeavesCallosumAndNotchOpen) {
     EXPECT_GT(centre.norm(), kCallosum_mm - 3.0);
     EXPECT_GT(std::hypot(centre[0], centre[1]), centre[2] < -10.0 ? 9.0 : 0.0);
     if (std::abs(centre[0]) < 2.0 && centre[2] > kTentorium_mm + 2.0) {
-      falx += std::abs(area[0]);
+      falx += 0.5 * std::abs(area[0]);
     } else {
       EXPECT_NEAR(centre[2], kTentorium_mm, 3.0);
-      tentorium += std::abs(area[2]);
+      tentorium += 0.5 * std::abs(area[2]);
     }
   }
   // The half plane between callosum and surface, above the tentorium: about 5,300 mm^2; the
