@@ -158,10 +158,10 @@ TriangleSurface boundary_surface(const TetMesh& mesh, std::vector<NodeIndex>* no
   return surface_of(mesh.nodes, boundary_triangles(mesh), node_of_vertex);
 }
 
-TriangleSurface surface_of(const Points& positions, Eigen::Matrix<int, 3, Eigen::Dynamic> triangles,
+TriangleSurface surface_of(const Points& positions, const Triangles& triangles,
                            std::vector<NodeIndex>* node_of_vertex) {
   TriangleSurface surface;
-  surface.triangles = std::move(triangles);
+  surface.triangles = triangles;
   std::vector<NodeIndex> nodes(surface.triangles.data(),
                                surface.triangles.data() + surface.triangles.size());
   std::sort(nodes.begin(), nodes.end());

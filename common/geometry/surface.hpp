@@ -22,7 +22,8 @@ TriangleSurface boundary_surface(const TetMesh& mesh,
                                  std::vector<NodeIndex>* node_of_vertex = nullptr);
 
 // Triangles between nodes of a mesh as a surface of its own, in the same way.
-TriangleSurface surface_of(const Points& nodes, Eigen::Matrix<int, 3, Eigen::Dynamic> triangles,
+TriangleSurface surface_of(const Points& nodes,
+                           const Eigen::Matrix<int, 3, Eigen::Dynamic>& triangles,
                            std::vector<NodeIndex>* node_of_vertex = nullptr);
 
 // The triangles between three of these nodes. Vertices are all of the nodes, in increasing order.
