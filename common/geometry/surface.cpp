@@ -228,6 +228,11 @@ double enclosed_volume(const TriangleSurface& surface) {
   return six_volumes / 6.0;
 }
 
+double growth_of_cavity(const TriangleSurface& wall, const Points& displacement) {
+  const TriangleSurface moved{wall.vertices + displacement, wall.triangles};
+  return enclosed_volume(wall) - enclosed_volume(moved);
+}
+
 double area(const TriangleSurface& surface) {
   double twice = 0.0;
   for (int t = 0; t < surface.num_triangles(); ++t) twice += area_vector(surface, t).norm();

@@ -16,12 +16,6 @@ void append(std::vector<Omission> omissions, Update& update) {
                          std::make_move_iterator(omissions.end()));
 }
 
-// wall: out of the tissue, so that it encloses the cavity's volume negatively.
-double growth_of_cavity(const TriangleSurface& wall, const Points& displacement) {
-  const TriangleSurface moved{wall.vertices + displacement, wall.triangles};
-  return geometry::enclosed_volume(wall) - geometry::enclosed_volume(moved);
-}
-
 }  // namespace
 
 Pipeline::Pipeline(const BrainModel& model, const CaseConfig& config, Method method,
@@ -98,7 +92,7 @@ Result<Update> Pipeline::answer(const Observation& observation, const RunOptions
   }
   if (ventricles_.num_triangles() > 0 &&
       estimate.displacement.cols() == ventricles_.num_vertices()) {
-    estimate.ventricle_change_mm3 = growth_of_cavity(ventricles_, estimate.displacement);
+    estimate.ventricle_change_mm3 = geometry::growth_of_cavity(ventricles_, estimate.displacement);
   }
   if (estimate.quality.usable()) {
     evidence_.trust();

@@ -133,6 +133,9 @@ TEST(SlitMesh, WhatIsTakenOutLeavesAWallThatLooksIntoTheCavity) {
   const TriangleSurface wall{cut.mesh.nodes, cut.wall};
   EXPECT_TRUE(is_closed(wall));
   EXPECT_NEAR(enclosed_volume(wall), -volume, 1e-9);
+  const Points outwards = 0.1 * (cut.mesh.nodes.colwise() - Vec3::Constant(20.0));
+  EXPECT_NEAR(growth_of_cavity(wall, outwards), (1.331 - 1.0) * volume, 1e-8);
+  EXPECT_NEAR(growth_of_cavity(wall, -outwards), (0.729 - 1.0) * volume, 1e-8);
   EXPECT_NEAR(test_support::mesh_quality(cut.mesh).volume_mm3, 64000.0 - volume, 1e-9);
   EXPECT_EQ(cut.mesh.num_nodes(), mesh.num_nodes() - 1);  // the one in the middle
   EXPECT_TRUE(check_mesh(cut.mesh).has_value());
