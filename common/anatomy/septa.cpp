@@ -28,7 +28,8 @@ double area_of(const Points& nodes, const Facet& f) {
 // Which tetrahedra are taken out.
 std::vector<char> cavities(const TetMesh& mesh, const std::string& what, Notes* notes) {
   std::vector<char> outer(at(mesh.num_nodes()), 0);
-  for (const int n : geometry::boundary_triangles(mesh).reshaped()) outer[at(n)] = 1;
+  const Eigen::Matrix3Xi surface = geometry::boundary_triangles(mesh);
+  for (const int n : surface.reshaped()) outer[at(n)] = 1;
   std::vector<int> inside;
   double touching_mm3 = 0.0, small_mm3 = 0.0, all_mm3 = 0.0;
   for (int t = 0; t < mesh.num_tets(); ++t) {
