@@ -243,13 +243,16 @@ Result<std::unique_ptr<Regions>> regions_of(const CaseInputs& inputs, Notes* not
   return std::make_unique<Regions>(std::move(*made));
 }
 
-// The sets of a mesh that was cut.
-void follow(NodeSets& sets, const std::vector<std::vector<NodeIndex>>& copies) {
+// The sets of a mesh that was cut: the copies of a node that lie on the outer surface.
+void follow(NodeSets& sets, const geometry::SlitMesh& cut) {
+  std::vector<char> outer(static_cast<std::size_t>(cut.mesh.num_nodes()), 0);
+  for (const int node : cut.outer.reshaped()) outer[static_cast<std::size_t>(node)] = 1;
   for (auto* set : {&sets.craniotomy, &sets.brainstem, &sets.slaves, &sets.fixed}) {
     std::vector<NodeIndex> nodes;
     for (const NodeIndex node : *set) {
-      const auto& now = copies[static_cast<std::size_t>(node)];
-      nodes.insert(nodes.end(), now.begin(), now.end());
+      for (const NodeIndex copy : cut.copies[static_cast<std::size_t>(node)]) {
+        if (outer[static_cast<std::size_t>(copy)] != 0) nodes.push_back(copy);
+      }
     }
     std::sort(nodes.begin(), nodes.end());
     *set = std::move(nodes);
@@ -360,7 +363,7 @@ Result<BrainModel> build_brain_model(const CaseInputs& inputs, const Progress& p
     auto cut = with_septa_and_ventricles(*mesh, **regions, config.anatomy, fitted->surface,
                                          named_labels(config), notes);
     if (!cut) return tl::unexpected(cut.error());
-    follow(*sets, cut->copies);
+    follow(*sets, *cut);
     tell_anatomy(*cut, named_labels(config), notes);
     model.septa = septa_of(*cut, sets->fixed, config.anatomy.septum_gap_mm);
     model.mesh = std::move(cut->mesh);

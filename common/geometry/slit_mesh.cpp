@@ -29,8 +29,8 @@ class Unions {
   }
   // The lower root stays.
   void join(std::size_t a, std::size_t b) {
-    const auto [low, high] = std::minmax(root(a), root(b));
-    parent_[high] = low;
+    const std::size_t first = root(a), second = root(b);
+    parent_[std::max(first, second)] = std::min(first, second);
   }
 
  private:
