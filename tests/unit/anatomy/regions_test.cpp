@@ -59,17 +59,17 @@ CaseInputs labelled_case(const std::map<int, int>& instead = {}) {
   return inputs;
 }
 
-struct Built {
+struct LabelledHead {
   BrainModel model;
   std::vector<std::string> notes;
 };
-Built built(const CaseInputs& inputs) {
-  Built made;
+LabelledHead head_of(const CaseInputs& inputs) {
+  LabelledHead made;
   made.model = value_or_fail(build_brain_model(inputs, {}, &made.notes));
   return made;
 }
-const Built& labelled_head() {
-  static const Built head = built(labelled_case());
+const LabelledHead& shared_head() {
+  static const LabelledHead head = head_of(labelled_case());
   return head;
 }
 
@@ -80,7 +80,7 @@ Vec3 centre_of(const TetMesh& mesh, int t) {
 }
 
 TEST(Regions, TissuesOfTheMeshAreThoseOfTheMap) {
-  const TetMesh& mesh = labelled_head().model.mesh;
+  const TetMesh& mesh = shared_head().model.mesh;
   const std::map<int, int> expected = {
       {2, kWhiteMatter},     {41, kWhiteMatter},     {3, kGreyMatter},     {42, kGreyMatter},
       {8, kCerebellumLabel}, {47, kCerebellumLabel}, {16, kBrainstemLabel}};
@@ -98,7 +98,7 @@ TEST(Regions, TissuesOfTheMeshAreThoseOfTheMap) {
 }
 
 TEST(Regions, VentriclesAreACavityWithAClosedWall) {
-  const BrainModel& model = labelled_head().model;
+  const BrainModel& model = shared_head().model;
   const TriangleSurface wall{model.mesh.nodes, model.ventricle_wall};
   EXPECT_TRUE(geometry::is_closed(wall));
   EXPECT_NEAR(-geometry::enclosed_volume(wall), geometry::balls::ball_volume(kVentricle_mm),
@@ -109,7 +109,7 @@ TEST(Regions, VentriclesAreACavityWithAClosedWall) {
 }
 
 TEST(Regions, TheSlitLeavesCallosumAndNotchOpen) {
-  const BrainModel& model = labelled_head().model;
+  const BrainModel& model = shared_head().model;
   double falx = 0.0, tentorium = 0.0;
   for (const auto& triangle : model.septa.triangles.colwise()) {
     const Vec3 a = model.mesh.nodes.col(triangle[0]), b = model.mesh.nodes.col(triangle[1]),
@@ -134,7 +134,7 @@ TEST(Regions, TheSlitLeavesCallosumAndNotchOpen) {
 }
 
 TEST(Regions, SlavesOfTheSheetsComeInPairsThatLookAwayFromOneAnother) {
-  const BrainModel& model = labelled_head().model;
+  const BrainModel& model = shared_head().model;
   std::map<std::array<double, 3>, Vec3> sum;
   std::map<std::array<double, 3>, int> count;
   for (std::size_t i = 0; i < model.septa.slaves.size(); ++i) {
@@ -155,7 +155,7 @@ TEST(Regions, SlavesOfTheSheetsComeInPairsThatLookAwayFromOneAnother) {
 }
 
 TEST(Regions, TheNodeSetsAreTheOuterSurface) {
-  const BrainModel& model = labelled_head().model;
+  const BrainModel& model = shared_head().model;
   std::vector<NodeIndex> all;
   for (const auto* set : {&model.craniotomy, &model.brainstem, &model.slaves, &model.fixed})
     all.insert(all.end(), set->begin(), set->end());
@@ -174,14 +174,14 @@ TEST(Regions, TheNodeSetsAreTheOuterSurface) {
 TEST(Regions, WhatIsNotAskedForIsNotThere) {
   CaseInputs inputs = labelled_case();
   inputs.config.anatomy.septa = inputs.config.anatomy.tissues = false;
-  const BrainModel model = built(inputs).model;
+  const BrainModel model = head_of(inputs).model;
   EXPECT_TRUE(model.septa.slaves.empty());
   EXPECT_TRUE(model.mesh.labels.empty());
   EXPECT_GT(model.ventricle_wall.cols(), 0);
   inputs.config.anatomy.ventricles = false;
-  const BrainModel without = built(inputs).model;
+  const BrainModel without = head_of(inputs).model;
   inputs.config.anatomy.labels.reset();
-  EXPECT_EQ(without.model_id, built(inputs).model.model_id);
+  EXPECT_EQ(without.model_id, head_of(inputs).model.model_id);
 }
 
 std::string refusal(const CaseInputs& inputs) {
@@ -217,7 +217,7 @@ TEST(Regions, WhereTissueJoinsTheSidesEverywhereThereIsNoSeptum) {
 }
 
 TEST(Regions, AMapWithoutVentriclesIsTold) {
-  const auto notes = built(labelled_case({{4, 2}, {43, 41}})).notes;
+  const auto notes = head_of(labelled_case({{4, 2}, {43, 41}})).notes;
   EXPECT_THAT(notes, ::testing::Contains(HasSubstr("has no label of the ventricles")));
 }
 

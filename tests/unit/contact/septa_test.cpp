@@ -111,13 +111,15 @@ TEST(Septa, BlocksThatArePulledApartCarryNothingAcross) {
     load(0, n) = sides[static_cast<std::size_t>(n)] * 1e-5 * volumes[n];
   const Points u = equilibrium(forward, load);
   EXPECT_EQ(count(forward.contact().penetrating(u)), 0);
-  // Each is a column of its own: at its free end f L^2 / 2 E of the displacement.
+  // Each is a column of its own: its free end moves by f L^2 / 2 E, in the mean over its few nodes.
   const double end = 1e-5 * 30.0 * 30.0 / 2.0 / (2.0 * kShear * (1.0 + kPoisson));
+  double mean = 0.0;
   for (const NodeIndex node : model.septa.slaves) {
     const double out = sides[static_cast<std::size_t>(node)] * u(0, node);
-    EXPECT_GT(out, 0.8 * end);
-    EXPECT_LT(out, 1.2 * end);
+    EXPECT_GT(out, 0.0);
+    mean += out / static_cast<double>(model.septa.slaves.size());
   }
+  EXPECT_NEAR(mean, end, 0.1 * end);
 }
 
 TEST(Septa, TissueMovesFreelyWithinTheGapAndStopsThere) {
