@@ -275,12 +275,16 @@ Septa septa_of(const geometry::SlitMesh& cut, const std::vector<NodeIndex>& fixe
 }
 
 void tell_anatomy(const geometry::SlitMesh& cut, const std::string& what, Notes* notes) {
-  const double septa_mm2 = 0.5 * geometry::area({cut.mesh.nodes, cut.sheets});
-  const double ventricles_mm3 = -geometry::enclosed_volume({cut.mesh.nodes, cut.wall});
-  add_note(notes,
-           fmt::format("{}: falx and tentorium of {:.0f} cm2 with {} nodes that may touch "
-                       "them, ventricles of {:.1f} cc",
-                       what, septa_mm2 / 100.0, cut.side_nodes.size(), ventricles_mm3 / 1000.0));
+  if (!cut.side_nodes.empty()) {
+    add_note(notes, fmt::format("{}: falx and tentorium of {:.0f} cm2 with {} nodes that may touch "
+                                "them",
+                                what, 0.5 * geometry::area({cut.mesh.nodes, cut.sheets}) / 100.0,
+                                cut.side_nodes.size()));
+  }
+  if (cut.wall.cols() > 0) {
+    add_note(notes, fmt::format("{}: ventricles of {:.1f} cc", what,
+                                -geometry::enclosed_volume({cut.mesh.nodes, cut.wall}) / 1000.0));
+  }
 }
 
 }  // namespace
