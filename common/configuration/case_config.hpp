@@ -148,6 +148,12 @@ struct PriorConfig {
   double opening_pressure_sd_pa = 930.0;  // pull and pressure at the craniotomy
   // Pressure of the fluid in the ventricles against that before surgery: drained or dammed up.
   double ventricle_pressure_sd_pa = 500.0;
+  // Volume strain where the ventricles lie, standard deviation of a bump: six of them lose a third
+  // of 25 ml with about one and a half (docs/decisions/0041).
+  double ventricle_volume_strain_sd = 0.03;
+  // Pressure of a retractor or a sleeve on tissue along the way to the tumour: 20 to 40 mmHg are
+  // usual where there is one, 2.7 to 5.3 kPa, five to eleven times this.
+  double tract_pressure_sd_pa = 500.0;
   // Method condensed: the strength of each part is estimated from the data of an update.
   bool estimate_scales = true;
   // Weight of the hypothesis that every part is as strong as before the data, whatever they say
@@ -214,7 +220,7 @@ std::string_view to_string(OutsideRegion outside);  // "extend", "refuse"
 // What is prepared before surgery for the condensed method.
 struct CondensedConfig {
   // Largest number of prior modes kept, those of the load families among them.
-  int max_rank = 168;
+  int max_rank = 189;
   // Bound on the memory that preparation may use, GiB; more is refused before the work begins.
   double memory_limit_gib = 8.0;
   // An update returns its best iterate when this time has passed, ms.

@@ -309,6 +309,15 @@ void visit(A& a, V& v) {
      "half of the pressure of cerebrospinal fluid",
      "0: no such modes. Without ventricles (anatomy) there are none."},
     v.ventricle_pressure_sd_pa, not_negative());
+  a({"ventricle_volume_strain_sd", "",
+     "Volume strain where the ventricles lie, standard deviation: fluid is drained or dammed up",
+     "decision 0041", "0: no such modes. With ventricles (anatomy) there are none."},
+    v.ventricle_volume_strain_sd, between(0.0, 2.0));
+  a({"tract_pressure_sd_pa", "Pa",
+     "Pressure of instruments on tissue along the way from the opening to the tumour, standard "
+     "deviation",
+     "decision 0041", "0: no such modes."},
+    v.tract_pressure_sd_pa, not_negative());
   a({"scales", "", "Strength of the prior's parts", "",
      "estimated: from the data of every update; a part that they do not need vanishes, and none "
      "is more than eight times as strong as above (method condensed). fixed: as above."},
@@ -393,7 +402,7 @@ void visit(A& a, V& v) {
 template <typename A, Of<CondensedConfig> V>
 void visit(A& a, V& v) {
   a({"max_rank", "", "Largest number of prior modes kept, those of the load families among them",
-     "docs/decisions/0037"},
+     "docs/decisions/0041"},
     v.max_rank, between(1, 2000));
   a({"memory_limit_gib", "GiB", "Bound on the memory of the preparation"}, v.memory_limit_gib,
     between(0.1, 1e4));

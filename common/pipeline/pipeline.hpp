@@ -11,6 +11,7 @@
 
 #include <functional>
 #include <memory>
+#include <optional>
 #include <stop_token>
 
 #include "common/configuration/case_config.hpp"
@@ -50,6 +51,12 @@ class Pipeline {
   // the inverter, which may be half changed: the next call makes another, or returns its error.
   // Precondition: the observation's numbers are finite (wire::decode_observation).
   Result<Update> run(const Observation& observation, const RunOptions& options = {});
+
+  // What the last update left unknown (inversion::Inverter::posterior).
+  std::optional<inversion::PosteriorModes> posterior() const {
+    return inverter_ ? inverter_->posterior() : std::nullopt;
+  }
+  const RegistrationTargets& targets() const { return targets_; }
 
   // A session begins: forgets what earlier ones observed and estimated.
   void reset();

@@ -25,6 +25,7 @@
 #include <Eigen/SparseCore>
 
 #include <memory>
+#include <stop_token>
 #include <string>
 #include <vector>
 
@@ -87,6 +88,7 @@ struct SurfaceDistanceOptions {
   double pose_sd_deg = 0.0;  // of its direction, about the points' centroid: three more
   // Fewer points over the surface are an error, in these words.
   int fewest = 10;
+  std::stop_token stop = {};  // looked at by build() among the points
   std::string measured = "cortical surface", surface = "craniotomy";
 };
 
@@ -102,7 +104,7 @@ class SurfaceDistances {
   // measured: 3 x m, mm RAS. T_undeformed_measured: the rigid motion from the measured points to
   // the undeformed surface. kInvalidArgument: fewer than options.fewest points lie over the
   // surface, so moved (the sentence says how many, and how far away their mean is). kNotFinite:
-  // names the point.
+  // names the point. kNotConverged: options.stop was requested.
   static Result<SurfaceDistances> build(
       std::shared_ptr<const IndexedPatch> patch, const Points& measured,
       const SurfaceDistanceOptions& options = {},

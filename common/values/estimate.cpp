@@ -24,6 +24,7 @@ std::string_view to_string(PriorPart part) {
                                                 "resection",
                                                 "opening",
                                                 "ventricles",
+                                                "tract",
                                                 "fine",
                                                 "medium",
                                                 "coarse",

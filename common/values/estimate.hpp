@@ -67,14 +67,15 @@ enum class PriorPart {
   kResection,      // removed tissue: its weight, and the stress that it carried
   kOpening,        // pull and pressure at the craniotomy
   kVentricles,     // pressure on the wall of the ventricles
+  kTract,          // instruments on the way from there to the tumour
   kFine,           // smooth residual field, shortest correlation length
   kMedium,
   kCoarse,  // longest
   kFar,     // what of the medium and coarse fields lies far from where data come from
 };
-inline constexpr int kPriorParts = 13;
+inline constexpr int kPriorParts = 14;
 // "along_gravity", "across_gravity", "gravity_sides", "gravity_ends", "tumour_volume",
-// "brain_volume", "resection", "opening", "ventricles", "fine", "medium", "coarse", "far"
+// "brain_volume", "resection", "opening", "ventricles", "tract", "fine", "medium", "coarse", "far"
 std::string_view to_string(PriorPart part);
 // One value for each part, in units of the case's standard deviations.
 template <typename T>
@@ -138,9 +139,9 @@ struct Estimate {
   // n, mm: root mean square over the three components of the standard deviation of a node's
   // displacement. Empty when uncertainty was not computed.
   VecX sd_mm;
-  // n, 0 to 1: how much of a node's variance before the data they took away. 0: the displacement
-  // there is a guess from the prior alone; 1: the data know it. Empty when uncertainty was not
-  // computed, and for methods other than condensed.
+  // n, 0 to 1: how much of a node's standard deviation before the data they took away. 0: the
+  // displacement there is a guess from the prior alone; 1: the data know it. Empty when uncertainty
+  // was not computed, and for methods other than condensed.
   VecX known;
   // Mean of `known` over the region that was prepared for data: about the tumour and under the
   // opening. NaN: not computed.

@@ -3,10 +3,13 @@
 #include <sys/stat.h>
 
 #include <CLI/CLI.hpp>
+#include <algorithm>
 #include <cstdio>
 #include <exception>
 #include <string>
+#include <vector>
 
+#include "common/io/files/command_words.hpp"
 #include "common/io/files/stop_signals.hpp"
 #include "common/linalg/openblas.hpp"
 #include "server/main/commands.hpp"
@@ -28,6 +31,16 @@ int parse_and_run(int argc, char** argv) {
       "  brainshiftd serve --config config/daemon.yaml --model colin27.h5\n"
       "Exit status: 0 success, 2 bad usage or bad input, 1 failure.");
 
+  // The other program's commands are its own to know: it says what it does not.
+  const std::vector<std::string> own = {"prepare", "serve", "health"};
+  if (argc > 1 && argv[1][0] != '-' && std::find(own.begin(), own.end(), argv[1]) == own.end()) {
+    const std::string typed = argv[1], meant = brainshift::io::nearest_word(typed, own);
+    if (meant.empty()) brainshift::io::become("brainshift", argv);
+    return print_error({brainshift::ErrorCode::kInvalidArgument,
+                        "unknown argument " + typed +
+                            (meant.empty() ? "" : ", did you mean " + meant + "?") +
+                            " (see brainshiftd --help)"});
+  }
   PrepareArguments prepare;
   auto* prepare_command = app.add_subcommand("prepare", "Build a patient's model from a case file");
   prepare_command->add_option("--case", prepare.case_file, "Case file (YAML)")->required();

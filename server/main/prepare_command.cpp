@@ -30,6 +30,12 @@ struct Outcome {
   double total_s = 0.0;
 };
 
+// Of the whole preparation: patient::prepare_model puts the boundary before what it does for it.
+std::string_view step_of(std::string_view stage) {
+  if (stage.starts_with(to_string(Boundary::kFixed))) return "step 2 of 4";
+  return stage.starts_with(to_string(Boundary::kContact)) ? "step 3 of 4" : "step 1 of 4";
+}
+
 Result<Outcome> prepare(const PrepareArguments& arguments, ProgressBar& bar) {
   const Stopwatch whole;
   patient::PrepareOptions options;
@@ -42,7 +48,9 @@ Result<Outcome> prepare(const PrepareArguments& arguments, ProgressBar& bar) {
   if (auto plan = pipeline::plan_scene(*config, Method::kCondensed, Boundary::kContact); !plan) {
     return tl::unexpected(plan.error());
   }
-  options.progress = bar.progress("");
+  options.progress = [&bar](std::string_view stage, double fraction) {
+    bar.show(step_of(stage), stage, fraction);
+  };
   options.on_resume = [&] {
     bar.note(fmt::format("going on from {} of an interrupted run", options.checkpoint.string()));
   };
@@ -51,7 +59,7 @@ Result<Outcome> prepare(const PrepareArguments& arguments, ProgressBar& bar) {
   for (const std::string& note : prepared->notes) {
     bar.note(fmt::format("{}: {}", arguments.case_file.string(), note));
   }
-  bar.show("", "write model", 1.0);
+  bar.show("step 4 of 4", "write model", 1.0);
   if (auto written = io::write_model(arguments.out, prepared->file); !written) {
     return tl::unexpected(written.error());
   }

@@ -217,7 +217,7 @@ _STATUSES = ("not_run", "iterating", "converged", "iteration_limit", "deadline")
 _METHODS = ("condensed", "paper", "paper-woodbury", "pcg")
 _BOUNDARIES = ("contact", "fixed")
 _PRIOR_PARTS = {"along_gravity", "across_gravity", "gravity_sides", "gravity_ends", "tumour_volume", "brain_volume",
-                "resection", "opening", "ventricles", "fine", "medium", "coarse", "far"}
+                "resection", "opening", "ventricles", "tract", "fine", "medium", "coarse", "far"}
 _MOST_HYPOTHESES = 4096
 _UNUSABLE_FROM = 17  # flags
 

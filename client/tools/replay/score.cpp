@@ -15,7 +15,6 @@ namespace brainshift::client {
 namespace {
 
 constexpr double kFieldErrorLimitPct = 5.0;  // "the majority (>99 %) were less than 5 %", paper 3.1
-constexpr double kNormalQuantile90 = 1.6448536269514722;  // two-sided 90 % of a standard normal
 
 const std::vector<io::ScorePoint>* points_of_kind(const io::SurgeryTruth& truth, const char* kind) {
   const auto found = truth.points.find(kind);

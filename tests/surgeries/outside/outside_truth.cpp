@@ -64,16 +64,20 @@ Result<OutsideTruths::Moved> OutsideTruths::follow(const Event& event, const Vec
   const Supports supports = supports_of(head_, event.changes, seed);
   Moved state{Points::Zero(3, space.num_nodes()), VecX::Zero(gaps.size())};
   Points before = Points::Zero(3, space.num_nodes());
+  const auto unsolved = [&](int step, const Error& error) {
+    return fail(ErrorCode::kNotConverged, "step " + std::to_string(step) + " of " +
+                                              std::to_string(event.steps) + ": " + error.message);
+  };
   for (int step = 1; step <= event.steps; ++step) {
     TetMesh mesh = space.mesh;
     mesh.nodes += state.u.leftCols(space.num_vertices());
     const fem::DisplacementSpace now = fem::make_space(mesh, space.element);
     auto body = ContactBody::make(now, tissue, supports);
-    if (!body) return tl::unexpected(body.error());
+    if (!body) return unsolved(step, body.error());
     const Points load = scale * step / event.steps * event.load(now);
     const Points more = load - before - body->push(state.pressing);
     auto next = body->solve(more, gaps - body->outward(state.u));
-    if (!next) return tl::unexpected(next.error());
+    if (!next) return unsolved(step, next.error());
     state.u += next->displacement;
     state.pressing = std::move(next->pressing_n);
     before = load;
@@ -152,7 +156,10 @@ Result<OutsideTruth> OutsideTruths::make(const Kind& kind, std::uint64_t seed) {
       scale *= std::pow(ratio, -1.0 / slope);
     }
     const auto found = moved(**body, event, gaps, load, scale, seed);
-    if (!found) return tl::unexpected(found.error());
+    if (!found) {
+      return fail(found.error().code, "kind " + kind.name + ", seed " + std::to_string(seed) +
+                                          ": " + found.error().message);
+    }
     OutsideTruth truth = judged(event, *found, scale);
     if (truth.min_volume_ratio >= kLeastVolume && truth.displacement.allFinite()) return truth;
   }

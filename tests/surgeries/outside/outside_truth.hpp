@@ -32,7 +32,8 @@ class OutsideTruths {
 
   // The same kind and seed give the same truth. Where an element of the case's mesh would be turned
   // inside out, the largest motion is made smaller by kLess until none is, kTries times at most.
-  // kNotConverged: it still is, or contact does not settle. Other errors of ContactBody.
+  // kNotConverged: it still is, contact does not settle, or a geometry on the way to a large strain
+  // cannot be solved. Other errors of ContactBody.
   Result<OutsideTruth> make(const Kind& kind, std::uint64_t seed);
   static constexpr double kLess = 0.8;
   static constexpr int kTries = 8;

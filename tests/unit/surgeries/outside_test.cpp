@@ -249,5 +249,25 @@ TEST(OutsideTruths, StepsOfASmallLoadAreTheLinearAnswer) {
   EXPECT_GT(linear.cwiseAbs().maxCoeff(), 0.04);
 }
 
+// A strain whose geometry cannot be solved is refused with the step where it ends.
+TEST(OutsideTruths, AStrainThatCannotBeSolvedIsRefused) {
+  const auto truths = value_or_fail(OutsideTruths::make(toy(), test_support::toy_config()));
+  const Kind kind{"too-far", "", [](const OutsideHead&, Random&) {
+                    Event event;
+                    event.load = [](const fem::DisplacementSpace& space) {
+                      return weight_load(space, -Vec3::UnitZ(),
+                                         [](const Vec3& x) { return x[2] > 40.0; });
+                    };
+                    event.largest_mm = 100.0;
+                    event.steps = 4;
+                    return event;
+                  }};
+  const auto truth = truths->make(kind, 4);
+  ASSERT_FALSE(truth);
+  EXPECT_EQ(truth.error().code, ErrorCode::kNotConverged);
+  EXPECT_NE(truth.error().message.find("kind too-far, seed 4: step "), std::string::npos)
+      << truth.error().message;
+}
+
 }  // namespace
 }  // namespace brainshift::outside

@@ -267,12 +267,37 @@ TEST_F(LoadDescentTest, TheMeanOverHypothesesMissesTheDataNoMoreThanTheMostProba
     Descent toy(given, locator, config());
     toy.find(swelling_data(*patient(), given->region, 0.4 * static_cast<double>(seed), seed));
     const double most_probable = toy.misfit(toy.descent.most_probable());
-    ASSERT_TRUE(toy.descent.average(toy.sampled, toy.strengths));
+    ASSERT_EQ(value_or_fail(toy.descent.average(toy.sampled, toy.strengths)), true);
     const double mean = toy.misfit(toy.descent.z());
     pressed = std::max(pressed, toy.descent.contact().size());
     EXPECT_LE(mean, most_probable + kLostByMean + 1e-9);
   }
   EXPECT_GT(pressed, 20) << "the test shows nothing without contact";
+}
+
+TEST_F(LoadDescentTest, WhenTimeIsOverTheLoadsStayWithTheirContact) {
+  const auto locator = std::make_shared<const geometry::TetLocator>(patient()->mesh);
+  Descent toy(operators(Boundary::kContact), locator, config());
+  const SparseData data = swelling_data(*patient(), toy.operators->region, 2.0, 3);
+  toy.find(data);
+  const VecX loads = toy.descent.most_probable();
+  // Far from where the loads are:
+  const SparseData next = swelling_data(*patient(), toy.operators->region, 6.0, 3);
+  toy.sampled.sample(next, RemainderVariances::Ones(), VecX::Constant(data.size(), 0.01));
+  ASSERT_TRUE(toy.descent.take(toy.sampled));
+  const std::vector<int> active = toy.descent.contact().active();
+  ASSERT_FALSE(active.empty());
+  ASSERT_TRUE(
+      toy.strengths.fit(toy.descent.posterior().gram(), toy.descent.posterior().right_hand_side()));
+  toy.limits.out_of_time = [] { return true; };
+  EXPECT_FALSE(value_or_fail(toy.descent.jump(toy.sampled, toy.strengths, toy.limits)));
+  EXPECT_EQ(value_or_fail(toy.descent.descend(toy.sampled, toy.strengths, false, toy.limits)),
+            EstimateStatus::kDeadline);
+  EXPECT_FALSE(value_or_fail(toy.descent.average(toy.sampled, toy.strengths, toy.limits)));
+  EXPECT_EQ(toy.descent.most_probable(), loads);
+  EXPECT_EQ(toy.descent.z(), loads);
+  EXPECT_EQ(toy.descent.contact().active(), active);
+  EXPECT_LE(toy.descent.contact().violation_mm(), kContactViolation_mm);
 }
 
 }  // namespace

@@ -32,9 +32,9 @@ TEST(PreparedModel, HoldsWhatItWasMadeFromAndItsTimes) {
                              [&](std::string_view stage, double) { stages.emplace(stage); }));
   EXPECT_EQ(model.boundary(), Boundary::kFixed);
   EXPECT_EQ(&model.model(), patient().get());
-  // Fluid levels in three directions and between sides and ends, bumps of three radii, the brain's
-  // halves, resection, opening.
-  EXPECT_EQ(model.prior().num_modes(), 10 + (27 + 27 + 7) + 4 + 9 + 21);
+  // Fluid levels in three directions and between sides and ends, the tumour's volume, bumps of the
+  // brain's and at its ventricles, resection, opening, tract.
+  EXPECT_EQ(model.prior().num_modes(), 10 + (27 + 27 + 7) + (4 + 6) + 9 + 21 + 15);
   EXPECT_GT(model.timings().factor_nonzeros, 0u);
   EXPECT_GT(model.timings().bytes, 0u);
   EXPECT_GE(model.timings().total_s, model.timings().factor_s);
