@@ -5,6 +5,8 @@
 //   craniotomy, brainstem   stress-free
 //   slaves                  kContact: free, with penalty contact against the skull
 //                           kFixed: fixed in the normal direction
+//   septa                   kContact: penalty contact against their sheets, from both sides
+//                           kFixed: fixed along the sheet's normal
 //   fixed                   fixed in the normal direction, tangentially free, exactly (rotated
 //                           frames, eliminated)
 //
@@ -36,9 +38,14 @@ namespace brainshift::contact {
 //
 //   material.tumour    tetrahedra whose centre lies inside the tumour's surface
 //   material.regions   tetrahedra of a label of the mesh (ventricles, white matter, tentorium)
+//   material.tissues   tetrahedra whose tissue the label map told (values/brain_model.hpp)
 //   the rest           material itself
-// The tumour has precedence over the regions. Density, permeability and storage are the same
+// The tumour has precedence over the regions, and they over the tissues. Density, permeability and storage are the same
 // everywhere.
+
+// The pairs of the model's slaves: with the skull (search_contact), then with the sheets of falx and
+// tentorium, whose gaps and normals the model holds.
+Result<std::vector<ContactPair>> contact_pairs(const BrainModel& model);
 
 // kInvalidArgument: a label that the mesh does not have; the sentence names the labels it has.
 // kEmptySet: no tetrahedron has its centre in the tumour.

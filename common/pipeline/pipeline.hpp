@@ -70,6 +70,7 @@ class Pipeline {
 
   CaseConfig config_;
   RegistrationTargets targets_;
+  TriangleSurface ventricles_;  // their wall, with all nodes of the mesh; empty without
   Update blank_;  // what is the same in every update: names, method, boundary, omissions
 
   Evidence evidence_;

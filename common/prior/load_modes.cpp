@@ -137,7 +137,7 @@ void add_brain_volume(const BrainModel& model, const PriorConfig& prior,
 
 void add_ventricles(const BrainModel& model, const PriorConfig& prior,
                     const std::vector<fem::Elasticity>& of_tet, Columns& out) {
-  if (prior.ventricle_volume_strain_sd == 0.0) return;
+  if (prior.ventricle_volume_strain_sd == 0.0 || model.ventricle_wall.cols() > 0) return;
   const Vec3 low = model.mesh.nodes.rowwise().minCoeff();
   const Vec3 extent = model.mesh.nodes.rowwise().maxCoeff() - low;
   for (const double side : {-1.0, 1.0}) {
@@ -263,6 +263,18 @@ void add_opening(const BrainModel& model, const PriorConfig& prior, const Openin
   }
 }
 
+void add_ventricle_pressure(const BrainModel& model, const PriorConfig& prior, Columns& out) {
+  if (prior.ventricle_pressure_sd_pa == 0.0 || model.ventricle_wall.cols() == 0) return;
+  const double middle =
+      0.5 * (model.mesh.nodes.row(0).minCoeff() + model.mesh.nodes.row(0).maxCoeff());
+  const auto add = [&](const auto& pressure) {
+    out.add(PriorPart::kVentricles, units::stress_from_pa(prior.ventricle_pressure_sd_pa),
+            fem::wall_pressure_load(model.mesh.nodes, model.ventricle_wall, pressure));
+  };
+  add([](const Vec3&) { return 1.0; });
+  add([&](const Vec3& x) { return std::tanh((x.x() - middle) / kMidlineWidth_mm); });
+}
+
 void add_tract(const BrainModel& model, const PriorConfig& prior, const Opening& opening,
                Columns& out) {
   if (prior.tract_pressure_sd_pa == 0.0 || opening.empty()) return;
@@ -310,6 +322,7 @@ Result<LoadModes> load_modes(const BrainModel& model, const CaseConfig& config) 
   add_resection(model, config, columns);
   const Opening opening = opening_of(model);
   add_opening(model, config.prior, opening, columns);
+  add_ventricle_pressure(model, config.prior, columns);
   add_tract(model, config.prior, opening, columns);
   return columns.modes();
 }

@@ -23,7 +23,8 @@
 //                          six places c of them, kVentriclesApart to either side of the brain's
 //                          middle, kVentricleLength in front of it, beside it and behind, and
 //                          kVentriclesAbove it; all in parts of the brain's extent along that axis,
-//                          s = kVentricleWidth of that from back to front
+//                          s = kVentricleWidth of that from back to front. Not where the model has
+//                          ventricles
 //   resection              w = exp(-r^2 / 2 s^2), whose integral over space is the tumour's volume
 //                          (2 pi)^(3/2) s^3. A weight w rho g along each axis, rho g that of tissue
 //                          in air; and an initial stress w sigma0, one of its six components at a
@@ -32,12 +33,16 @@
 //                          middle and kBumpsOfRing around it, at kRing of its half axes, Gaussians
 //                          with standard deviations of kBumpWidth of them. What pulls or presses
 //                          there, a spatula or dura that gives way, does not do so all over
-//   tract   what instruments do on the straight way from the middle of the opening to the tumour's
-//           centre, of length l. At the depth t l and the distance r from the way
-//             w_k = max(0, 1 - |2 t - k|) exp(-r^2 / 2 s^2),  k = 0, 1, 2,  s = kTractWidth_mm
-//           An initial stress p w_k in each of the three components across the way, which parts
-//           tissue or lets it close; and a force density p w_k / s in both directions across,
-//           which moves it aside
+//   ventricles             pressure on the wall of the ventricles, pressing the tissue outwards: the
+//                          same all over, and tanh(x / kMidlineWidth_mm) of the distance x from the
+//                          brain's middle to the right: fluid is drained from one of the two
+//   tract                  what instruments do on the straight way from the middle of the opening to
+//                          the tumour's centre, of length l. At the depth t l and the distance r
+//                          from the way
+//                            w_k = max(0, 1 - |2 t - k|) exp(-r^2 / 2 s^2),  k = 0, 1, 2,
+//                          s = kTractWidth_mm. An initial stress p w_k in each of the three
+//                          components across the way, which parts tissue or lets it close; and a
+//                          force density p w_k / s in both directions across, which moves it aside
 // Swelling honours the stiffness of tumour and regions (contact::tissue_map). All families have
 // zero mean and their columns are independent.
 #pragma once

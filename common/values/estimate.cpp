@@ -23,6 +23,7 @@ std::string_view to_string(PriorPart part) {
                                                 "brain_volume",
                                                 "resection",
                                                 "opening",
+                                                "ventricles",
                                                 "tract",
                                                 "fine",
                                                 "medium",

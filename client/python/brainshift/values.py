@@ -342,6 +342,7 @@ class Update:
     misfit_ratio: Optional[float]  # 1: data as far off as their errors say
     data_outside_region: int
     region_known: Optional[float]  # mean of known over the region of surgery
+    ventricle_change_mm3: Optional[float]  # by how much the ventricles have grown; None: the model has none
     received_s: float = 0.0  # when this client received it, by currency.boot_time()
 
     def __repr__(self) -> str:

@@ -244,7 +244,13 @@ std::string case_text(const Draft& draft) {
   text += "  centre_mm: " + list_text(draft.stem, 1) + "\n";
   text += fmt::format("  radius_mm: {:.0f}\n", kStemRadius_mm);
   text += "\ngravity:\n" + comment(draft.about_gravity, 2);
-  return text + "  direction: " + list_text(draft.gravity, 4) + "\n";
+  text += "  direction: " + list_text(draft.gravity, 4) + "\n";
+  if (draft.options.labels.empty()) return text;
+  text += "\n" + comment(
+                     "Tissues, falx, tentorium and ventricles from the label map "
+                     "(docs/your-patient.md): without the comment signs the model has them.",
+                     0);
+  return text + "# anatomy:\n#   labels: " + file_text(draft.options.labels) + "\n";
 }
 
 // ---- what is guessed ----

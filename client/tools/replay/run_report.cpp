@@ -127,6 +127,7 @@ void visit(A& a, RunReport& v) {
   a("field_error_pct", v.field_error_pct), a("share_below_5_pct", v.share_below_5_pct);
   a("largest_true_displacement_mm", v.largest_true_displacement_mm);
   a("coverage_90", v.coverage_90), a("region_known", v.region_known), a("contact", v.contact);
+  a("ventricle_change_cc", v.ventricle_change_cc);
   a("principal_direction_deg", v.principal_direction_deg);
   a("principal_direction_true_deg", v.principal_direction_true_deg);
   a("truth_scalars", v.truth_scalars), a("left_out", v.left_out), a("failures", v.failures);

@@ -173,7 +173,8 @@ struct RunReport {
   std::optional<double> share_below_5_pct;
   std::optional<double> largest_true_displacement_mm;
   std::optional<double> coverage_90;
-  std::optional<double> region_known;  // Estimate::region_known
+  std::optional<double> region_known;         // Estimate::region_known
+  std::optional<double> ventricle_change_cc;  // Estimate::ventricle_change_mm3
   std::optional<ContactSummary> contact;
   std::optional<double> principal_direction_deg;
   std::optional<double> principal_direction_true_deg;

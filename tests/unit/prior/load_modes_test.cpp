@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "common/fem/elasticity.hpp"
+#include "common/geometry/slit_mesh.hpp"
 #include "common/geometry/surface.hpp"
 #include "tests/support/dense.hpp"
 #include "tests/support/results.hpp"
@@ -43,7 +44,7 @@ LoadModes modes_of(const BrainModel& patient, const CaseConfig& config) {
 TEST(LoadModes, StandInTheOrderOfTheirParts) {
   const BrainModel patient = test_support::toy_patient(8);
   const LoadModes modes = modes_of(patient, only(1.0, 0.05, 0.01, 1.0, 300.0, 600.0));
-  const PerPart<int> expected = {2, 4, 0, 0, 27, 4, 9, 21, 0, 0, 0, 0};
+  const PerPart<int> expected = {2, 4, 0, 0, 27, 4, 9, 21, 0, 0, 0, 0, 0};
   EXPECT_EQ(modes.of_part, expected);
   EXPECT_EQ(modes.size(), 67);
   EXPECT_EQ(part_of_column(1, modes.of_part), PriorPart::kAlongGravity);
@@ -432,6 +433,34 @@ TEST(LoadModes, ATumourWithoutATetrahedronIsNamed) {
   config.material.tumour = TissueStiffness{6300.0, 0.45};
   patient.tumour.vertices.colwise() += Vec3(500.0, 0.0, 0.0);
   refusal_of(load_modes(patient, config), ErrorCode::kEmptySet);
+}
+
+// A cavity of one cell of the box: pressure on its wall balances itself, and does the work p dV
+// when the cavity grows.
+TEST(LoadModes, VentriclesPressOnTheirWall) {
+  BrainModel patient = test_support::toy_patient(6);
+  std::vector<char> taken;
+  for (int t = 0; t < patient.mesh.num_tets(); ++t) {
+    Vec3 centre = Vec3::Zero();
+    for (int k = 0; k < 4; ++k) centre += 0.25 * patient.mesh.nodes.col(patient.mesh.tets(k, t));
+    taken.push_back((centre - Vec3(35, 25, 25)).cwiseAbs().maxCoeff() < 5.0);
+  }
+  auto cut = geometry::cut_mesh(patient.mesh, taken, {}, {});
+  patient.mesh = std::move(cut.mesh);
+  patient.ventricle_wall = std::move(cut.wall);
+  CaseConfig config = only(0, 0, 0, 0, 0, 0);
+  config.prior.ventricle_pressure_sd_pa = 500.0;
+  const LoadModes modes = modes_of(patient, config);
+  ASSERT_EQ(modes.of_part[static_cast<std::size_t>(PriorPart::kVentricles)], 2);
+  const Points load =
+      Eigen::Map<const Points>(modes.columns.col(0).data(), 3, patient.mesh.num_nodes());
+  EXPECT_LT(load.rowwise().sum().norm(), 1e-15);
+  const Points growing = patient.mesh.nodes.colwise() - Vec3(35, 25, 25);
+  EXPECT_NEAR(load.cwiseProduct(growing).sum(), 500e-6 * 3.0 * 1000.0, 1e-12);
+  const TriangleSurface wall{patient.mesh.nodes, patient.ventricle_wall};
+  EXPECT_NEAR(-geometry::enclosed_volume(wall), 1000.0, 1e-9);
+  config.prior.ventricle_pressure_sd_pa = 0.0;
+  EXPECT_EQ(modes_of(patient, config).size(), 0);
 }
 
 }  // namespace
