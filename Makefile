@@ -6,7 +6,7 @@ JOBS   ?= $(shell nproc)
 BUILD  := build/$(PRESET)
 
 .DEFAULT_GOAL := help
-.PHONY: help setup configure build demo test test-kernels studies bench verify stability sensing interchange surgeries evidence ablations replays calculix prior faults fuzz documents format format-check tidy packages image clean
+.PHONY: help setup configure build demo test test-kernels studies bench verify stability sensing interchange surgeries evidence ablations replays calculix prior advice page faults scaling fuzz documents format format-check tidy packages image clean
 
 help: ## list the targets
 	@sed -n 's/^\([a-z-]*\):.*## \(.*\)/  make \1|\2/p' $(MAKEFILE_LIST) | column -t -s '|' 2>/dev/null \
@@ -85,11 +85,25 @@ prior: configure ## brains drawn from the prior against published brain shift, i
 	cmake --build --preset $(PRESET) -j $(JOBS) --target prior_programs
 	cmake/scripts/prior.sh $(BUILD)
 
+advice: configure ## what `brainshift advise` predicts against measurements that are made, into out/advice; QUICK=1, RESUME=1
+	cmake --build --preset $(PRESET) -j $(JOBS) --target advice_programs
+	cmake/scripts/advice.sh $(BUILD)
+
+page: configure ## the page of `brainshift view` in Chromium beside a daemon, timed, into out/page; CASE=FILE, MODEL=FILE
+	cmake --build --preset $(PRESET) -j $(JOBS) --target brainshiftd brainshift python_client
+	cmake/scripts/page.sh $(BUILD)
+
 faults: setup ## the daemon through kills, bad peers, stalls, loads; into out/faults; TOPICS="kills rate", BRIEF=1
 	@docker/install-packages.sh docker/packages-faults.txt
 	@cmake --preset $(PRESET) --log-level=WARNING
 	cmake --build --preset $(PRESET) -j $(JOBS) --target fault_programs
 	cmake/scripts/faults.sh $(BUILD) out/faults $(TOPICS)
+
+scaling: setup ## preparing a model by one process and by several (MPI), measured and extrapolated, into out/scaling; QUICK=1, EDGES, RANKS
+	@docker/install-packages.sh docker/packages-mpi.txt
+	@cmake --preset $(PRESET) --log-level=WARNING -DBRAINSHIFT_MPI=ON
+	cmake --build --preset $(PRESET) -j $(JOBS) --target scaling_programs
+	cmake/scripts/scaling.sh $(BUILD)
 
 documents: configure ## what docs/slicer.md, python.md and cpp.md say, typed as written; needs THROWAWAY=1, since it installs
 	cmake --build --preset $(PRESET) -j $(JOBS) --target brainshiftd brainshift python_client

@@ -40,6 +40,20 @@ target_include_directories(brainshift_mumps SYSTEM INTERFACE ${MUMPS_INCLUDE_DIR
 target_link_libraries(brainshift_mumps INTERFACE
   ${MUMPS_LIBRARY} ${MUMPS_COMMON_LIBRARY} ${MUMPS_MPI_STUB_LIBRARY})
 
+# The parallel MUMPS, for brainshiftd-mpi alone. It and the sequential one with its stub of MPI have the same names: what a program
+# lists first wins, MPI's Fortran names and ScaLAPACK included.
+if(BRAINSHIFT_MPI)
+  find_package(MPI REQUIRED COMPONENTS C)
+  find_library(MUMPS_MPI_LIBRARY dmumps REQUIRED)
+  find_library(MUMPS_MPI_COMMON_LIBRARY mumps_common REQUIRED)
+  find_library(SCALAPACK_LIBRARY scalapack-openmpi REQUIRED)
+  find_library(MPI_FORTRAN_LIBRARY mpi_mpifh REQUIRED HINTS ${MPI_C_LIBRARY_DIRS} /usr/lib/x86_64-linux-gnu/openmpi/lib)
+  add_library(brainshift_mpi_libraries INTERFACE)
+  target_include_directories(brainshift_mpi_libraries SYSTEM INTERFACE ${MUMPS_INCLUDE_DIR} ${MPI_C_INCLUDE_DIRS})
+  target_link_libraries(brainshift_mpi_libraries INTERFACE
+    "-Wl,--push-state,--no-as-needed,${MUMPS_MPI_LIBRARY},${MUMPS_MPI_COMMON_LIBRARY},${SCALAPACK_LIBRARY},${MPI_FORTRAN_LIBRARY},--pop-state" ${MPI_C_LIBRARIES})
+endif()
+
 # BLAS and LAPACK by their standard names, as CHOLMOD links them.
 find_path(CBLAS_INCLUDE_DIR cblas.h PATH_SUFFIXES openblas-pthread REQUIRED)
 find_library(BLAS_LIBRARY blas REQUIRED)

@@ -1,6 +1,7 @@
 # Language level, warnings, sanitizers.
 option(BRAINSHIFT_BUILD_TESTS "Build tests and benchmarks" ON)
 option(BRAINSHIFT_CLIENT_ONLY "Build and install the C++ client library alone: no solver, nothing under the GPL" OFF)
+option(BRAINSHIFT_MPI "Build brainshiftd-mpi, which prepares a model by several processes" OFF)
 set(BRAINSHIFT_SANITIZE "" CACHE STRING "Sanitizers, e.g. address,undefined or thread")
 
 # See brainshift_archives in BrainshiftTargets.cmake.

@@ -8,6 +8,10 @@ string(REGEX REPLACE "# systemd unit for a bare machine.*\n\\[Unit\\]" "\n[Unit]
 file(WRITE ${CMAKE_BINARY_DIR}/brainshiftd.service "${unit}")
 install(TARGETS brainshiftd brainshift RUNTIME DESTINATION ${CMAKE_INSTALL_BINDIR} COMPONENT programs)
 install(FILES ${CMAKE_BINARY_DIR}/brainshiftd.service DESTINATION lib/systemd/system COMPONENT programs)
+foreach(program brainshift brainshiftd)
+  install(FILES ${CMAKE_SOURCE_DIR}/cmake/completion.bash DESTINATION share/bash-completion/completions RENAME ${program}
+    COMPONENT programs)
+endforeach()
 install(FILES ${CMAKE_SOURCE_DIR}/config/daemon.yaml DESTINATION share/doc/brainshift/examples COMPONENT programs)
 install(DIRECTORY ${CMAKE_SOURCE_DIR}/config/cases DESTINATION share/doc/brainshift/examples COMPONENT programs)
 install(FILES ${CMAKE_SOURCE_DIR}/LICENSE DESTINATION share/doc/brainshift RENAME copyright COMPONENT programs)

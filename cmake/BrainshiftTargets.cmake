@@ -45,6 +45,7 @@ endfunction()
 # The shared library of all folders, for tests. Called once, after the last folder.
 function(brainshift_add_product_library)
   get_property(folders GLOBAL PROPERTY BRAINSHIFT_FOLDERS)
+  list(REMOVE_ITEM folders common/mpi)  # its MUMPS has the names of the sequential one
   add_library(brainshift_product SHARED EXCLUDE_FROM_ALL ${CMAKE_BINARY_DIR}/precompiled/brainshift_headers.cpp
     $<TARGET_OBJECTS:brainshift_proto>)
   set(libraries "")

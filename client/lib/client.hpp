@@ -54,8 +54,8 @@
 // Conventions. Coordinates are patient RAS in millimetres. Points are 3 x n matrices, a column per
 // point. A displacement moves an undeformed point to its deformed place; its columns are in the
 // order of BrainModel::mesh.nodes, or of Update::part. Estimate::sd_mm and Estimate::known have one
-// entry per column, or none at all: the standard deviation, mm, and how much of the variance before
-// the data they took away, from 0 (a guess from the prior alone) to 1.
+// entry per column, or none at all: the standard deviation, mm, and how much of the standard
+// deviation before the data they took away, from 0 (a guess from the prior alone) to 1.
 //
 // Errors. Every call returns a value or an Error: a code to branch on and one sentence to show.
 //   kUnavailable    no daemon, no answer in time, a lost connection, or a daemon that is stopping

@@ -1,11 +1,11 @@
 #!/usr/bin/python3
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""before-and-after.py BIN_DIR [OUT.png]: the picture of the README, from a run of the real programs.
+"""before-and-after.py RUN.json OUT.png: the picture of the README, from a run with contact of `make demo`.
 
-Prepares the default case, simulates the surgery `paper-icp` with seed 1, plays it to a daemon with a journal, and draws
-in a coronal slice through the tumour: where the MRI says the tumour is and where it is; where the update says it is; and,
-along a line from the opening through the tumour, the true displacement with the update's own 90 % interval. Takes two
-minutes. Needs Debian's python3-matplotlib and python3-vtk9. OUT.png: docs/pictures/before-and-after.png by default.
+RUN.json is of `brainshift replay`, its field beside it, of the default case and a simulated surgery (the demo: paper-icp,
+seed 1). In a coronal slice through the tumour: where the MRI says the tumour is and where it is; where the update says it
+is; and, along a line from the opening through the tumour, the true displacement with the update's own 90 % interval.
+Needs Debian's python3-matplotlib and python3-vtk9.
 """
 import gzip
 import json
@@ -14,7 +14,6 @@ import re
 import struct
 import subprocess
 import sys
-import tempfile
 
 import matplotlib
 
@@ -27,36 +26,8 @@ from vtk.util.numpy_support import numpy_to_vtk, vtk_to_numpy
 
 ROOT = pathlib.Path(__file__).parents[2]
 CASE = ROOT / "config" / "cases" / "colin27.yaml"
-SCENARIO, SEED = "paper-icp", 1
 QUANTILE_90 = 1.645
 BEFORE, TRUE, ESTIMATE = "#ffffff", "#56b4e9", "#e69f00"
-
-
-def run(*command):
-    return subprocess.run([str(c) for c in command], check=True, capture_output=True, text=True).stdout
-
-
-def play(programs, folder):
-    """Mesh with displacement_true, displacement_estimated and sd_mm at its nodes, after the surgery's last update."""
-    model, surgery, report = folder / "m.h5", folder / "s.surgery", folder / "r.json"
-    (folder / "journal").mkdir()
-    (folder / "d.yaml").write_text(f"endpoint: tcp://127.0.0.1:*\njournal_dir: {folder / 'journal'}\n")
-    run(programs / "brainshiftd", "prepare", "--case", CASE, "--out", model)
-    run(programs / "brainshift", "simulate", "--case", CASE, "--scenario", SCENARIO, "--seed", SEED, "--out", surgery)
-    daemon = subprocess.Popen([programs / "brainshiftd", "serve", "--config", folder / "d.yaml", "--model", model],
-                              stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True)
-    try:
-        endpoint = daemon.stdout.readline().split()[-1]
-        run(programs / "brainshift", "replay", surgery, "--endpoint", endpoint, "--boundary", "contact", "--report", report)
-    finally:
-        daemon.terminate()
-        daemon.wait()
-    (journal,) = (folder / "journal").glob("*.surgery")
-    run(programs / "brainshift", "journal", "export", journal, "--vtu", folder / "fields", "--model", model)
-    (result,) = json.loads(report.read_text())
-    mesh = read_mesh(folder / result["field_file"])
-    mesh.GetPointData().AddArray(read_mesh(sorted((folder / "fields").glob("*.vtu"))[-1]).GetPointData().GetArray("sd_mm"))
-    return mesh, result
 
 
 def read_mesh(path):
@@ -206,12 +177,11 @@ def draw(mesh, result, out):
 
 
 def main():
-    if len(sys.argv) < 2:
+    if len(sys.argv) != 3:
         sys.exit(__doc__)
-    out = pathlib.Path(sys.argv[2] if len(sys.argv) > 2 else ROOT / "docs" / "pictures" / "before-and-after.png")
-    out.parent.mkdir(parents=True, exist_ok=True)
-    with tempfile.TemporaryDirectory() as folder:
-        draw(*play(pathlib.Path(sys.argv[1]).resolve(), pathlib.Path(folder)), out)
+    report, out = map(pathlib.Path, sys.argv[1:])
+    result = next(run for run in json.loads(report.read_text()) if run["boundary"] == "contact")
+    draw(read_mesh(report.parent / result["field_file"]), result, out)
     subprocess.run([sys.executable, ROOT / "cmake" / "scripts" / "palette-pictures.py", out], check=True)
 
 

@@ -39,7 +39,10 @@ step "replay: scenario sag-progress, 100 updates by the condensed method, contac
 reports=("${scenarios[@]/%/.json}" paper-method.json sag-progress.json)
 step "report: tables and pictures" \
   "$bin/brainshift" report "${reports[@]/#/$out/runs/}" --out "$out"
+step "picture: the README's, of scenario paper-icp" \
+  /usr/bin/python3 cmake/scripts/before-and-after.py "$out/runs/paper-icp.json" "$out/before-and-after.png"
 step "stop: daemon" stop_daemon
+printf '   the report is ready: %s/report.html; one more figure follows\n' "$out"
 step "error against time: all methods on a mesh of 5 thousand nodes (make bench has the others)" \
   "$bin/bench_error_time" --case "$case_file" --sizes 5 --scenarios paper --quick --out "$out/bench"
 step "error against time: figure" studies bench --dir "$out/bench" --figures-only

@@ -5,11 +5,13 @@
 # out/evidence): rows-HEAD.csv (a row per update), points.csv, checks.csv, left_out.csv, pictures,
 # patients-HEAD.md (the paper's Tables 3 to 6 beside ours), page.md (the tables of docs/evidence.md),
 # tables.md, summary.json; landmarks-CASE.csv where BRAINSHIFT_EXTERNAL_DATA has landmarks; patient-N/, a
-# report of patients 1 to 4 as the daemon and the client play them (the paper's Figs. 6 to 8).
+# report of patients 1 to 4 as the daemon and the client play them (the paper's Figs. 6 to 8). Truths from
+# outside the prior on the same patients, and what studies outside makes of them, go to OUT_DIR-outside.
 # Exit status 0 only if every check holds.
 #   RESUME=0         forget the surgeries that OUT_DIR has; otherwise a run goes on where it ended
-#   BRAINSHIFT_EXTERNAL_DATA=...  folder with mni152/ and resect_case4/; without it the second head
-#                    and the landmarks are left out
+#   OUTSIDE=0        no truths from outside (the longest part)
+#   BRAINSHIFT_EXTERNAL_DATA=...  folder with mni152/, resect_case1/ and resect_case4/; without it
+#                    the second head and the landmarks are left out
 #   HEADS="..."      case files of heads (default: colin27, and mni152 where it can be had; the truth
 #                    `calculix` is of colin27 alone)
 #   SEEDS=N          surgeries per patient and truth (default: 2)
@@ -30,6 +32,7 @@ if [ "${QUICK:-0}" = 1 ]; then
   options=(--resume --seeds 1 --first-seed 1001 --thousand-nodes 6 --patients 1 2
     --truths consistency mesh gap all)
 fi
+if [ "${OUTSIDE:-1}" = 1 ]; then resume_study "$out-outside" "${RESUME:-1}"; fi
 resume_study "$out" "${RESUME:-1}"
 
 # The paper's Figs. 6 and 7 (patients 1 and 4; 2 and 3), and Fig. 8 (patients 1 and 2, its own
@@ -66,13 +69,30 @@ fi
 for head in ${HEADS:-$heads}; do
   step "$head" "$bin/evidence" --head "$head" --out "$out/rows-$head.csv" "${options[@]}" || status=1
 done
-pairs=${BRAINSHIFT_EXTERNAL_DATA:-}/resect_case4/Case4-MRI-beforeUS.csv
-if [ -f "$pairs" ]; then
-  step landmarks "$bin/evidence_landmarks" --pairs "$pairs" --case config/cases/resect-4.yaml \
-    --out "$out/landmarks-resect-4.csv" || status=1
+# Truths from outside the prior on the same patients.
+outside_of_patients() {
+  local options=(--patients 1 2 3 4 5 --seeds "${SEEDS:-2}" --kinds all)
+  if [ "${QUICK:-0}" = 1 ]; then
+    options=(--patients 1 2 --seeds 1 --first-seed 1001 --thousand-nodes 6 --kinds air-side,cavity)
+  fi
+  "$bin/surgeries" "${options[@]}" --resume --out "$out-outside/rows-patients.csv" || return
+  studies outside --dir "$out-outside" --commit "$(commit_name)"
+}
+if [ "${OUTSIDE:-1}" = 1 ]; then
+  step "truths from outside" outside_of_patients || status=1
 else
-  echo "landmarks,BRAINSHIFT_EXTERNAL_DATA has no landmarks of a real operation" >>"$out/left_out.csv"
+  echo "truths from outside,OUTSIDE=0" >>"$out/left_out.csv"
 fi
+for pairs in 1/Case1-beforeUS-afterUS.tag 4/Case4-MRI-beforeUS.csv; do
+  resect=resect-${pairs%%/*}
+  file=${BRAINSHIFT_EXTERNAL_DATA:-}/resect_case$pairs
+  if [ -f "$file" ]; then
+    step "$resect" "$bin/evidence_landmarks" --pairs "$file" --case "config/cases/$resect.yaml" \
+      --out "$out/landmarks-$resect.csv" || status=1
+  else
+    echo "$resect,BRAINSHIFT_EXTERNAL_DATA has no landmarks of this operation" >>"$out/left_out.csv"
+  fi
+done
 if [ "${QUICK:-0}" = 1 ]; then
   echo "figures,the paper's Figs. 6 to 8 are not drawn in the short form" >>"$out/left_out.csv"
 else

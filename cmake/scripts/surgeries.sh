@@ -2,13 +2,15 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 # surgeries.sh BUILD_DIR [OUT_DIR]: many different simulated surgeries on two heads, estimated with the
 # defaults (docs/surgeries.md). Empties OUT_DIR (default: out/surgeries) and writes to it:
-# rows-HEAD.csv (a row per update), outside.md (a line per head, kind and data), points.csv, checks.csv, left_out.csv, pictures, tables.md,
-# summary.json. Exit status 0 only if every check holds.
+# rows-HEAD.csv (a row per update), of truths from outside outside.md (a line per head, kind and data), musts.md
+# and summary.md, points.csv, checks.csv, left_out.csv, pictures, tables.md, summary.json. Exit status 0 only if every check holds.
 #   BRAINSHIFT_EXTERNAL_DATA=...  folder with mni152/; without it the second head is left out
 #   RESUME=1         keep the surgeries that OUT_DIR has, after an interruption
 #   BEFORE=DIR       rows-*.csv of an earlier estimate on the same surgeries, to compare with
 #                    (default: docs/surgeries/before)
 #   KINDS=a,b        these kinds of truths from outside, and no scenario (docs/surgeries.md)
+#   FIXED=1          estimate truths from outside with prior.scales: fixed too, in OUT_DIR-fixed, and hold the
+#                    default's interval score against it
 #   QUICK=1          2 places x 2 seeds, from 1001 and 1101, on 6 thousand nodes
 set -euo pipefail
 cd "$(dirname "$0")/../.."
@@ -29,12 +31,19 @@ fi
 if [ -n "${KINDS:-}" ]; then
   options+=(--kinds "$KINDS")
 fi
+fixed=$out-fixed fixed_options=(--fixed-strengths) compared=()
+if [ -z "${KINDS:-}" ]; then fixed_options+=(--kinds all); fi
+if [ "${FIXED:-0}" = 1 ]; then resume_study "$fixed" "${RESUME:-0}"; fi
 resume_study "$out" "${RESUME:-0}"
 
 status=0
 head_of() {  # CASE FIRST_SEED
   step "$1" "$bin/surgeries" --head "config/cases/$1.yaml" --first-seed "$2" \
     --out "$out/rows-$1.csv" "${options[@]}" || status=1
+  if [ "${FIXED:-0}" = 1 ]; then
+    step "$1 with fixed strengths" "$bin/surgeries" --head "config/cases/$1.yaml" --first-seed "$2" \
+      --out "$fixed/rows-$1.csv" "${options[@]}" "${fixed_options[@]}" || status=1
+  fi
 }
 head_of colin27 "$first"
 if [ -n "${BRAINSHIFT_EXTERNAL_DATA:-}" ]; then
@@ -44,5 +53,6 @@ else
 fi
 shopt -s nullglob
 current=summary
-studies surgeries --dir "$out" --commit "$(commit_name)" --before "$before"/rows-*.csv || status=1
+if [ "${FIXED:-0}" = 1 ]; then compared=(--fixed "$fixed"/rows-*.csv); fi
+studies surgeries --dir "$out" --commit "$(commit_name)" --before "$before"/rows-*.csv "${compared[@]}" || status=1
 exit "$status"

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <cstdint>
 #include <set>
+#include <string_view>
 #include <vector>
 
 #include "common/anatomy/given_inputs.hpp"
@@ -106,6 +107,53 @@ Structure structure_of(int label) {
   // aparc: cortex of the left and right, and white matter below it.
   const bool parcel = (label >= 1000 && label < 5000) || (label >= 11100 && label < 15000);
   return parcel ? kCerebrum : kOther;
+}
+
+Side side_of(int label) {
+  for (const NamedLabel& known : kLabels) {
+    if (known.number != label) continue;
+    const std::string_view name = known.name;
+    return name.starts_with("Left-")    ? Side::kLeft
+           : name.starts_with("Right-") ? Side::kRight
+                                        : Side::kNone;
+  }
+  if (structure_of(label) != kCerebrum) return Side::kNone;
+  // 1000, 3000, 11100, 13100 left; 2000, 4000, 12100, 14100 right.
+  return label / 1000 % 2 == 1 ? Side::kLeft : Side::kRight;
+}
+
+Matter matter_of(int label) {
+  for (const NamedLabel& known : kLabels) {
+    if (known.number != label) continue;
+    const std::string_view name = known.name;
+    if (name.ends_with("Cerebral-Cortex")) return Matter::kCortex;
+    const bool nucleus =
+        (label >= 10 && label <= 26 && label != 25) || (label >= 49 && label <= 58 && label != 57);
+    return nucleus ? Matter::kNucleus : Matter::kWhite;
+  }
+  const int thousands = label / 1000;
+  return thousands == 3 || thousands == 4 || thousands > 12 ? Matter::kWhite : Matter::kCortex;
+}
+
+VoxelImage with_freesurfer_numbers_of_aal(VoxelImage map) {
+  const auto number_of = [](int label) {
+    struct Nucleus {
+      int aal, left, right;
+    };
+    constexpr Nucleus kNuclei[] = {{37, 17, 53}, {41, 18, 54}, {71, 11, 50},
+                                   {73, 12, 51}, {75, 13, 52}, {77, 10, 49}};
+    if (label < 1 || label > 116) return 0;
+    if (label > 90) return label % 2 == 1 || label > 108 ? 8 : 47;
+    for (const Nucleus& nucleus : kNuclei) {
+      if (label == nucleus.aal) return nucleus.left;
+      if (label == nucleus.aal + 1) return nucleus.right;
+    }
+    return label % 2 == 1 ? 3 : 42;
+  };
+  for (float& v : map.values) {
+    v = std::isfinite(v) ? static_cast<float>(number_of(static_cast<int>(std::lround(v)))) : 0.0F;
+  }
+  return map;
 }
 
 Result<VoxelImage> with_freesurfer_numbers(const VoxelImage& map,

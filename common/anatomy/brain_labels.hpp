@@ -17,6 +17,18 @@ namespace brainshift::anatomy {
 enum class Structure { kOther, kCerebrum, kCerebellum, kBrainstem, kVentricle, kFluid };
 Structure structure_of(int label);
 
+// Of a label of the cerebrum. Nuclei are grey matter that is no cortex. kNone: the callosum, lesions
+// and other labels that both hemispheres share.
+enum class Side { kNone, kLeft, kRight };
+enum class Matter { kCortex, kNucleus, kWhite };
+Side side_of(int label);
+Matter matter_of(int label);
+
+// Numbers of the AAL atlas (1 to 116, odd left, even right) to FreeSurfer's of the same structure
+// and side: cortex, nuclei, cerebellar cortex. Other numbers become 0.
+// Source: Tzourio-Mazoyer et al. 2002, NeuroImage 15:273.
+VoxelImage with_freesurfer_numbers_of_aal(VoxelImage map);
+
 // The labels of a map with names of its own (BIDS's *_dseg.tsv), renumbered: a name that is
 // FreeSurfer's ("Brain-Stem", in any case, without regard to blanks, hyphens and underscores) has
 // FreeSurfer's number, every other becomes 0. kInvalidArgument: no name is FreeSurfer's.

@@ -293,8 +293,14 @@ Result<geometry::SizingField> sizing_field(const MeshGeneration& settings,
   });
 }
 
+// Only falx, tentorium and the walls of ventricles need to be smooth.
+bool loose(int a, int b) {
+  return septum_between(a, b) == Septum::kNone && a != kVentricleRegion && b != kVentricleRegion;
+}
+
 Result<TetMesh> generate(const CaseInputs& inputs, const MeshGeneration& settings,
-                         const TriangleSurface& tumour, const Progress& progress, Notes* notes) {
+                         const TriangleSurface& tumour, const Progress& progress, Notes* notes,
+                         const Regions* regions) {
   const std::string file = fmt::format("images.brain = '{}'", inputs.config.brain.string());
   if (!inputs.brain) return invalid(file + ": was not read");
   report(progress, "mask", 0.0);
@@ -305,7 +311,10 @@ Result<TetMesh> generate(const CaseInputs& inputs, const MeshGeneration& setting
   const VoxelImage smooth = geometry::gaussian_smooth(*component, settings.smoothing_mm);
   const auto edge_mm = sizing_field(settings, inputs.config.craniotomy, smooth, tumour);
   if (!edge_mm) return tl::unexpected(edge_mm.error());
-  auto mesh = geometry::mesh_mask(smooth, *edge_mm, {}, progress);
+  auto mesh = regions == nullptr ? geometry::mesh_mask(smooth, *edge_mm, {}, progress)
+                                 : geometry::mesh_regions(
+                                       smooth, [regions](const Vec3& x) { return regions->at(x); },
+                                       loose, *edge_mm, {}, progress);
   if (!mesh) return fail(mesh.error().code, fmt::format("{}: {}", file, mesh.error().message));
   return mesh;
 }
@@ -313,9 +322,9 @@ Result<TetMesh> generate(const CaseInputs& inputs, const MeshGeneration& setting
 }  // namespace
 
 Result<TetMesh> make_brain_mesh(const CaseInputs& inputs, const TriangleSurface& tumour,
-                                const Progress& progress, Notes* notes) {
+                                const Progress& progress, Notes* notes, const Regions* regions) {
   if (const auto* settings = std::get_if<MeshGeneration>(&inputs.config.mesh))
-    return generate(inputs, *settings, tumour, progress, notes);
+    return generate(inputs, *settings, tumour, progress, notes, regions);
   const std::string file =
       fmt::format("mesh.file = '{}'", std::get<MeshFile>(inputs.config.mesh).path.string());
   if (!inputs.mesh) return invalid(file + ": was not read");

@@ -6,6 +6,7 @@
 #include <string>
 
 #include "common/anatomy/given_inputs.hpp"
+#include "common/anatomy/regions.hpp"
 #include "common/configuration/case_inputs.hpp"
 #include "common/core/error.hpp"
 #include "common/core/mesh.hpp"
@@ -46,7 +47,9 @@ const char* tumour_key(const CaseConfig& config);
 // Either way the largest side of the bounding box must lie between 20 and 400 mm; outside this
 // range metres and millimetres were probably mixed up (kInvalidArgument). kEmptySet: mask without
 // component. kDegenerateMesh.
+// regions (optional), of a generated mesh: its tetrahedra lie in one of them each (mesh_regions).
 Result<TetMesh> make_brain_mesh(const CaseInputs& inputs, const TriangleSurface& tumour,
-                                const Progress& progress = {}, Notes* notes = nullptr);
+                                const Progress& progress = {}, Notes* notes = nullptr,
+                                const Regions* regions = nullptr);
 
 }  // namespace brainshift::anatomy

@@ -6,9 +6,11 @@
 
 #include <algorithm>
 #include <limits>
+#include <memory>
 #include <utility>
 
 #include "common/anatomy/brain_mesh.hpp"
+#include "common/anatomy/septa.hpp"
 #include "common/geometry/closest_point.hpp"
 #include "common/geometry/distance_volume.hpp"
 #include "common/geometry/misplacement.hpp"
@@ -32,6 +34,9 @@ constexpr double kLargestSkull_mm = 500.0;
 constexpr double kFarthestSkull_mm = 15.0;
 // A node that stands deeper than this makes every update unusable (values/quality.hpp).
 constexpr double kDeepest_mm = 3.0;
+
+// Width of the Gaussian that smooths regions, at least.
+constexpr double kSmoothingOverEdge = 0.35;
 
 enum class Role { kNone, kCraniotomy, kBrainstem };
 
@@ -219,6 +224,69 @@ Result<DistanceGrid> tumour_distances(const TriangleSurface& tumour) {
   return geometry::signed_distance_grid(*index);
 }
 
+std::string named_labels(const CaseConfig& config) {
+  return fmt::format("anatomy.labels = '{}'", config.anatomy.labels->string());
+}
+
+// Null without a label map, or where nothing of it is asked for.
+Result<std::unique_ptr<Regions>> regions_of(const CaseInputs& inputs, Notes* notes) {
+  const AnatomyConfig& wanted = inputs.config.anatomy;
+  const bool any = wanted.tissues || wanted.septa || wanted.ventricles;
+  if (!wanted.labels || !any) return std::unique_ptr<Regions>();
+  const std::string what = named_labels(inputs.config);
+  if (!inputs.labels) return invalid(what + ": was not read");
+  const auto& settings = std::get<MeshGeneration>(inputs.config.mesh);
+  auto made = Regions::build(inputs.config, *inputs.labels, inputs.label_names,
+                             std::max(settings.smoothing_mm, kSmoothingOverEdge * settings.edge_mm),
+                             what, notes);
+  if (!made) return tl::unexpected(made.error());
+  return std::make_unique<Regions>(std::move(*made));
+}
+
+// The sets of a mesh that was cut: the copies of a node that lie on the outer surface.
+void follow(NodeSets& sets, const geometry::SlitMesh& cut) {
+  std::vector<char> outer(static_cast<std::size_t>(cut.mesh.num_nodes()), 0);
+  for (const int node : cut.outer.reshaped()) outer[static_cast<std::size_t>(node)] = 1;
+  for (auto* set : {&sets.craniotomy, &sets.brainstem, &sets.slaves, &sets.fixed}) {
+    std::vector<NodeIndex> nodes;
+    for (const NodeIndex node : *set) {
+      for (const NodeIndex copy : cut.copies[static_cast<std::size_t>(node)]) {
+        if (outer[static_cast<std::size_t>(copy)] != 0) nodes.push_back(copy);
+      }
+    }
+    std::sort(nodes.begin(), nodes.end());
+    *set = std::move(nodes);
+  }
+}
+
+// Nodes that are held along the skull's normal are no slaves of a sheet: contact needs free ones.
+Septa septa_of(const geometry::SlitMesh& cut, const std::vector<NodeIndex>& fixed, double gap_mm) {
+  Septa septa;
+  std::vector<Eigen::Index> columns;
+  for (std::size_t i = 0; i < cut.side_nodes.size(); ++i) {
+    if (std::binary_search(fixed.begin(), fixed.end(), cut.side_nodes[i])) continue;
+    septa.slaves.push_back(cut.side_nodes[i]);
+    columns.push_back(static_cast<Eigen::Index>(i));
+  }
+  septa.normals = cut.side_normals(Eigen::all, columns);
+  septa.gap_mm = gap_mm;
+  septa.triangles = cut.sheets;
+  return septa;
+}
+
+void tell_anatomy(const geometry::SlitMesh& cut, const std::string& what, Notes* notes) {
+  if (!cut.side_nodes.empty()) {
+    add_note(notes, fmt::format("{}: falx and tentorium of {:.0f} cm2 with {} nodes that may touch "
+                                "them",
+                                what, 0.5 * geometry::area({cut.mesh.nodes, cut.sheets}) / 100.0,
+                                cut.side_nodes.size()));
+  }
+  if (cut.wall.cols() > 0) {
+    add_note(notes, fmt::format("{}: ventricles of {:.1f} cc", what,
+                                -geometry::enclosed_volume({cut.mesh.nodes, cut.wall}) / 1000.0));
+  }
+}
+
 }  // namespace
 
 BrainSurface brain_surface_of(const TetMesh& mesh) {
@@ -273,7 +341,9 @@ Result<BrainModel> build_brain_model(const CaseInputs& inputs, const Progress& p
   auto tumour = make_tumour_surface(inputs, notes);
   if (!tumour) return tl::unexpected(tumour.error());
 
-  auto mesh = make_brain_mesh(inputs, *tumour, progress, notes);
+  auto regions = regions_of(inputs, notes);
+  if (!regions) return tl::unexpected(regions.error());
+  auto mesh = make_brain_mesh(inputs, *tumour, progress, notes, regions->get());
   if (!mesh) return tl::unexpected(mesh.error());
   auto fitted = fit_tumour(std::move(*tumour), *mesh, config);
   if (!fitted) return tl::unexpected(fitted.error());
@@ -292,8 +362,21 @@ Result<BrainModel> build_brain_model(const CaseInputs& inputs, const Progress& p
 
   BrainModel model;
   model.case_id = config.case_id;
-  model.boundary_triangles = geometry::boundary_triangles(*mesh);
-  model.mesh = std::move(*mesh);
+  if (*regions) {
+    report(progress, "falx, tentorium, ventricles", 0.0);
+    auto cut = with_septa_and_ventricles(*mesh, **regions, config.anatomy, fitted->surface,
+                                         named_labels(config), notes);
+    if (!cut) return tl::unexpected(cut.error());
+    follow(*sets, *cut);
+    tell_anatomy(*cut, named_labels(config), notes);
+    model.septa = septa_of(*cut, sets->fixed, config.anatomy.septum_gap_mm);
+    model.mesh = std::move(cut->mesh);
+    model.boundary_triangles = std::move(cut->outer);
+    model.ventricle_wall = std::move(cut->wall);
+  } else {
+    model.boundary_triangles = geometry::boundary_triangles(*mesh);
+    model.mesh = std::move(*mesh);
+  }
   model.skull = std::move(*skull);
   model.tumour = std::move(fitted->surface);
   model.tumour_distance = std::move(*distances);

@@ -69,6 +69,15 @@ struct TissueStiffness {
   double poisson_ratio = 0.46;
 };
 
+// Stiffness of the tissues that a label map tells apart, over that of the brain. The mean over a
+// head is 1.
+struct TissueRatios {
+  double white_matter = 1.16;
+  double grey_matter = 0.85;
+  double cerebellum = 0.85;
+  double brainstem = 1.8;
+};
+
 struct Material {  // Table 1
   double shear_modulus_pa = 2100.0;
   double poisson_ratio = 0.46;
@@ -81,6 +90,7 @@ struct Material {  // Table 1
   // Tissues of another stiffness (contact/forward_model.hpp): the tumour, and labels of the mesh.
   std::optional<TissueStiffness> tumour;
   std::map<int, TissueStiffness> regions;
+  TissueRatios tissues;  // of tetrahedra with the labels of values/brain_model.hpp
 };
 double largest_poisson_ratio(const Material& material);
 
@@ -89,6 +99,17 @@ struct ContactConfig {
   std::optional<std::filesystem::path> skull_file;  // patient's own inner skull surface instead
   double slave_depth_mm = 20.0;                     // second plane below the fluid plane
   double penalty_n_per_mm = 5.0;                    // beta (section 2.3)
+};
+
+// Structures inside the brain, from a label map (anatomy/regions.hpp).
+enum class LabelNumbers { kFreeSurfer, kAal };
+struct AnatomyConfig {
+  std::optional<std::filesystem::path> labels;
+  LabelNumbers numbers = LabelNumbers::kFreeSurfer;
+  bool tissues = true;     // white and grey matter, cerebellum, brainstem: a stiffness each
+  bool septa = true;       // falx and tentorium: slits with a fixed sheet
+  bool ventricles = true;  // cavities
+  double septum_gap_mm = 0.5;
 };
 
 // Prior on forces, zero mean: families of loads (prior/load_modes.hpp), and smooth residual fields
@@ -125,6 +146,14 @@ struct PriorConfig {
   double resection_weight_sd = 0.0;
   double resection_stress_sd_pa = 0.0;
   double opening_pressure_sd_pa = 930.0;  // pull and pressure at the craniotomy
+  // Pressure of the fluid in the ventricles against that before surgery: drained or dammed up.
+  double ventricle_pressure_sd_pa = 500.0;
+  // Volume strain where the ventricles lie, standard deviation of a bump: six of them lose a third
+  // of 25 ml with about one and a half (docs/decisions/0041).
+  double ventricle_volume_strain_sd = 0.03;
+  // Pressure of a retractor or a sleeve on tissue along the way to the tumour: 20 to 40 mmHg are
+  // usual where there is one, 2.7 to 5.3 kPa, five to eleven times this.
+  double tract_pressure_sd_pa = 500.0;
   // Method condensed: the strength of each part is estimated from the data of an update.
   bool estimate_scales = true;
   // Weight of the hypothesis that every part is as strong as before the data, whatever they say
@@ -194,7 +223,7 @@ std::string_view to_string(OutsideRegion outside);  // "extend", "refuse"
 // What is prepared before surgery for the condensed method.
 struct CondensedConfig {
   // Largest number of prior modes kept, those of the load families among them.
-  int max_rank = 168;
+  int max_rank = 189;
   // Bound on the memory that preparation may use, GiB; more is refused before the work begins.
   double memory_limit_gib = 8.0;
   // An update returns its best iterate when this time has passed, ms.
@@ -235,6 +264,7 @@ struct CaseConfig {
   Brainstem brainstem;
   Vec3 gravity_direction = Vec3(0, -1, 0);  // normalised on reading
   Material material;
+  AnatomyConfig anatomy;
   ContactConfig contact;
   PriorConfig prior;
   InversionConfig inversion;

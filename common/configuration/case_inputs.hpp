@@ -2,7 +2,9 @@
 // CaseInputs: the contents of the files that a case names, not interpreted yet.
 #pragma once
 
+#include <map>
 #include <optional>
+#include <string>
 
 #include "common/configuration/case_config.hpp"
 #include "common/core/mesh.hpp"
@@ -16,6 +18,8 @@ struct CaseInputs {
   std::optional<VoxelImage> tumour_labels;        // TumourLabel: its label marks the tumour
   std::optional<TriangleSurface> tumour_surface;  // TumourSurfaceFile
   std::optional<TriangleSurface> skull;           // contact.skull_file
+  std::optional<VoxelImage> labels;               // anatomy.labels
+  std::map<int, std::string> label_names;         // of the table beside them; empty without one
 };
 
 }  // namespace brainshift

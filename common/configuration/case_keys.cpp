@@ -69,6 +69,8 @@ Status validate(const CaseConfig& config) {
   visit(checker, config);
   checker.require(!config.brain.empty() || !std::holds_alternative<MeshGeneration>(config.mesh),
                   "images.brain", "must name a brain mask to mesh");
+  checker.require(!config.anatomy.labels || std::holds_alternative<MeshGeneration>(config.mesh),
+                  "anatomy.labels", "needs a mesh that is generated (mesh.generate)");
   return checker.status();
 }
 

@@ -36,6 +36,9 @@ inline constexpr Word<SurfaceGuidance> kGuidanceWords[] = {
     {SurfaceGuidance::kDistances, "distances"}, {SurfaceGuidance::kRigid, "rigid"}};
 inline constexpr Word<OutsideRegion> kOutsideWords[] = {{OutsideRegion::kExtend, "extend"},
                                                         {OutsideRegion::kRefuse, "refuse"}};
+inline constexpr Word<LabelNumbers> kNumbersWords[] = {{LabelNumbers::kFreeSurfer, "freesurfer"},
+                                                       {LabelNumbers::kAal, "aal"}};
+inline constexpr Word<bool> kUsedWords[] = {{true, "on"}, {false, "off"}};
 inline constexpr Word<Carry> kCarryWords[] = {
     {Carry::kAuto, "auto"}, {Carry::kOn, "on"}, {Carry::kOff, "off"}};
 
@@ -173,6 +176,47 @@ void visit(A& a, V& v) {
       {"regions", "", "Stiffness of labels of the mesh (ventricles, white matter, tentorium, ...)",
        "", "Default: none. Each label has the keys of material.tumour."},
       v.regions, rest);
+  a.section({"tissues", "",
+             "Shear moduli of the tissues that anatomy.labels tells apart, in units of "
+             "shear_modulus_pa"},
+            Need::kOptional, [&] {
+              const char* const budday =
+                  "white over grey 1.36: Budday et al. 2015, J. Mech. Behav. Biomed. Mater. 46:318";
+              const Limits limits = between(0.1, 10.0);
+              a({"white_matter", "", "White matter", budday}, v.tissues.white_matter, limits);
+              a({"grey_matter", "", "Grey matter", budday}, v.tissues.grey_matter, limits);
+              a({"cerebellum", "", "Cerebellum", "as grey matter, most of it"},
+                v.tissues.cerebellum, limits);
+              a({"brainstem", "", "Brainstem",
+                 "80 to 100 % stiffer: Arbogast and Margulies 1998, J. Biomech. 31:801"},
+                v.tissues.brainstem, limits);
+            });
+}
+
+template <typename A, Of<AnatomyConfig> V>
+void visit(A& a, V& v) {
+  a({"labels", "",
+     "Label map of the head (NIfTI, NRRD or .mgz): aseg, aparc+aseg, SynthSeg, a map with a "
+     "BIDS table of names beside it (*_dseg.tsv), or AAL",
+     "", "Without it the model knows none of the following."},
+    v.labels);
+  a({"numbers", "", "What the labels' numbers mean", "",
+     "aal: 1 to 116, odd left and even right, the cerebellum from 91; no white matter, brainstem "
+     "or ventricles."},
+    v.numbers, kNumbersWords);
+  a({"tissues", "",
+     "White and grey matter, cerebellum and brainstem with stiffnesses of their own "
+     "(material.tissues)"},
+    v.tissues, kUsedWords);
+  a({"septa", "",
+     "Falx and tentorium: slits where no tissue joins left and right, or cerebrum and cerebellum, "
+     "each with a fixed sheet that tissue may leave and not pass"},
+    v.septa, kUsedWords);
+  a({"ventricles", "", "Ventricles as cavities with a free wall (prior.ventricle_pressure_sd_pa)"},
+    v.ventricles, kUsedWords);
+  a({"septum_gap_mm", "mm", "Gap between tissue and the sheet on either side before surgery",
+     "below the millimetre at the skull"},
+    v.septum_gap_mm, between(0.0, 5.0));
 }
 
 template <typename A, Of<ContactConfig> V>
@@ -261,6 +305,20 @@ void visit(A& a, V& v) {
   a({"opening_pressure_sd_pa", "Pa", "Pull and pressure at the craniotomy, standard deviation",
      "decision 0018", "0: no such modes."},
     v.opening_pressure_sd_pa, not_negative());
+  a({"ventricle_pressure_sd_pa", "Pa",
+     "Pressure on the wall of the ventricles, standard deviation: fluid drained or dammed up",
+     "half of the pressure of cerebrospinal fluid",
+     "0: no such modes. Without ventricles (anatomy) there are none."},
+    v.ventricle_pressure_sd_pa, not_negative());
+  a({"ventricle_volume_strain_sd", "",
+     "Volume strain where the ventricles lie, standard deviation: fluid is drained or dammed up",
+     "decision 0041", "0: no such modes. With ventricles (anatomy) there are none."},
+    v.ventricle_volume_strain_sd, between(0.0, 2.0));
+  a({"tract_pressure_sd_pa", "Pa",
+     "Pressure of instruments on tissue along the way from the opening to the tumour, standard "
+     "deviation",
+     "decision 0041", "0: no such modes."},
+    v.tract_pressure_sd_pa, not_negative());
   a({"scales", "", "Strength of the prior's parts", "",
      "estimated: from the data of every update; a part that they do not need vanishes, and none "
      "is more than eight times as strong as above (method condensed). fixed: as above."},
@@ -352,7 +410,7 @@ void visit(A& a, V& v) {
 template <typename A, Of<CondensedConfig> V>
 void visit(A& a, V& v) {
   a({"max_rank", "", "Largest number of prior modes kept, those of the load families among them",
-     "docs/decisions/0037"},
+     "docs/decisions/0041"},
     v.max_rank, between(1, 2000));
   a({"memory_limit_gib", "GiB", "Bound on the memory of the preparation"}, v.memory_limit_gib,
     between(0.1, 1e4));
@@ -440,6 +498,8 @@ void visit(A& a, V& v) {
       v.gravity_direction, direction());
   });
   section({"material"}, Need::kOptional, v.material);
+  section({"anatomy", "", "Structures inside the brain, from a label map"}, Need::kOptional,
+          v.anatomy);
   section({"contact", "", "Contact between brain and skull"}, Need::kOptional, v.contact);
   section({"prior", "",
            "What is known about the forces before any measurement: zero mean, covariance as below"},

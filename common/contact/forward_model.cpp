@@ -32,12 +32,22 @@ Points boundary_normals(const BrainModel& model) {
   return geometry::vertex_normals({model.mesh.nodes, model.boundary_triangles});
 }
 
+// As slaves of the skull are; those that are slaves of it too, or of another sheet, keep that normal.
+void fix_along_septa(const BrainModel& model, fem::DofMap& dofs) {
+  std::set<NodeIndex> held(model.slaves.begin(), model.slaves.end());
+  for (std::size_t i = 0; i < model.septa.slaves.size(); ++i) {
+    if (!held.insert(model.septa.slaves[i]).second) continue;
+    dofs.fix_normal(model.septa.slaves[i], model.septa.normals.col(static_cast<Eigen::Index>(i)));
+  }
+}
+
 fem::DofMap constrain(const BrainModel& model, Boundary boundary) {
   const Points normals = boundary_normals(model);
   fem::DofMap dofs(model.mesh.num_nodes());
   for (NodeIndex node : model.fixed) dofs.fix_normal(node, normals.col(node));
   if (boundary == Boundary::kFixed) {
     for (NodeIndex node : model.slaves) dofs.fix_normal(node, normals.col(node));
+    fix_along_septa(model, dofs);
   }
   dofs.finalise();
   return dofs;
@@ -45,7 +55,24 @@ fem::DofMap constrain(const BrainModel& model, Boundary boundary) {
 
 Result<fem::StiffnessFactor> factorise(const BrainModel& model, const CaseConfig& config,
                                        const fem::MaterialMap& materials, const fem::DofMap& dofs,
-                                       const linalg::SymmetricMatrix& stiffness) {
+                                       const linalg::SymmetricMatrix& stiffness,
+                                       const SharedNodes& shared) {
+  if (shared.ranks != nullptr) {
+    if (config.scene.pressure == Carry::kOn) {
+      return invalid("scene.pressure = on: a model with pressure is prepared by one process");
+    }
+    std::vector<int> part(static_cast<std::size_t>(dofs.num_unknowns()));
+    for (int node = 0; node < dofs.num_nodes(); ++node) {
+      for (int axis = 0; axis < 3; ++axis) {
+        const int unknown = dofs.unknown(node, axis);
+        if (unknown < 0) continue;
+        part[static_cast<std::size_t>(unknown)] = shared.part[static_cast<std::size_t>(node)];
+      }
+    }
+    auto parts = linalg::DistributedCholesky::factorise(stiffness, part, *shared.ranks);
+    if (!parts) return tl::unexpected(parts.error());
+    return fem::StiffnessFactor(std::move(*parts));
+  }
   if (config.scene.pressure != Carry::kOn) {
     auto drained = linalg::SparseCholesky::factorise(stiffness);
     if (!drained) return tl::unexpected(drained.error());
@@ -62,20 +89,43 @@ Result<fem::StiffnessFactor> factorise(const BrainModel& model, const CaseConfig
 
 }  // namespace
 
+Result<std::vector<ContactPair>> contact_pairs(const BrainModel& model) {
+  auto pairs = search_contact(model.mesh.nodes, model.slaves, model.skull);
+  if (!pairs) return pairs;
+  const Septa& septa = model.septa;
+  for (std::size_t i = 0; i < septa.slaves.size(); ++i) {
+    const Vec3 normal = septa.normals.col(static_cast<Eigen::Index>(i));
+    const Vec3 sheet = model.mesh.nodes.col(septa.slaves[i]) - septa.gap_mm * normal;
+    pairs->push_back({septa.slaves[i], sheet, normal, -septa.gap_mm});
+  }
+  return pairs;
+}
+
 Result<fem::MaterialMap> tissue_map(const BrainModel& model, const Material& material) {
   const TetMesh& mesh = model.mesh;
   auto map = fem::MaterialMap::uniform(fem::poro_material_from(material), mesh.num_tets());
   const std::set<int> labels(mesh.labels.begin(), mesh.labels.end());
-  for (const auto& [label, tissue] : material.regions) {
-    if (labels.count(label) == 0) {
-      return invalid("material.regions." + std::to_string(label) +
-                     ": the mesh has no such label (there: " + listed(labels) + ")");
-    }
+  const auto add = [&](int label, const TissueStiffness& tissue) {
     const auto index = static_cast<int>(map.materials.size());
     map.materials.push_back(with_stiffness(material, tissue));
     for (std::size_t t = 0; t < mesh.labels.size(); ++t) {
       if (mesh.labels[t] == label) map.of_tet[t] = index;
     }
+  };
+  const std::pair<int, double> told[] = {{kWhiteMatter, material.tissues.white_matter},
+                                         {kGreyMatter, material.tissues.grey_matter},
+                                         {kCerebellumLabel, material.tissues.cerebellum},
+                                         {kBrainstemLabel, material.tissues.brainstem}};
+  for (const auto& [label, ratio] : told) {
+    if (labels.count(label) == 0) continue;
+    add(label, {ratio * material.shear_modulus_pa, material.poisson_ratio});
+  }
+  for (const auto& [label, tissue] : material.regions) {
+    if (labels.count(label) == 0) {
+      return invalid("material.regions." + std::to_string(label) +
+                     ": the mesh has no such label (there: " + listed(labels) + ")");
+    }
+    add(label, tissue);
   }
   if (!material.tumour) return map;
   const auto tumour = geometry::ClosestPointIndex::build(model.tumour);
@@ -108,7 +158,8 @@ ForwardModel::ForwardModel(Boundary boundary, fem::DofMap dofs,
       assemble_s_(assemble_s) {}
 
 Result<ForwardModel> ForwardModel::build(const BrainModel& model, const CaseConfig& config,
-                                         Boundary boundary, const Progress& progress) {
+                                         Boundary boundary, const Progress& progress,
+                                         const SharedNodes& shared) {
   const Stopwatch watch;
   report(progress, "assemble", 0.0);
   fem::DofMap dofs = constrain(model, boundary);
@@ -121,12 +172,12 @@ Result<ForwardModel> ForwardModel::build(const BrainModel& model, const CaseConf
   std::vector<ContactPair> pairs;
   if (boundary == Boundary::kContact) {
     report(progress, "contact search", 0.0);
-    auto found = search_contact(model.mesh.nodes, model.slaves, model.skull);
+    auto found = contact_pairs(model);
     if (!found) return tl::unexpected(found.error());
     pairs = std::move(*found);
   }
   report(progress, "factorise", 0.0);
-  auto factor = factorise(model, config, *materials, dofs, stiffness);
+  auto factor = factorise(model, config, *materials, dofs, stiffness, shared);
   if (!factor) return tl::unexpected(factor.error());
   report(progress, "factorise", 1.0);
   return ForwardModel(boundary, std::move(dofs), stiffness, std::move(*factor),

@@ -5,6 +5,8 @@
 //   craniotomy, brainstem   stress-free
 //   slaves                  kContact: free, with penalty contact against the skull
 //                           kFixed: fixed in the normal direction
+//   septa                   kContact: penalty contact against their sheets, from both sides
+//                           kFixed: fixed along the sheet's normal
 //   fixed                   fixed in the normal direction, tangentially free, exactly (rotated
 //                           frames, eliminated)
 //
@@ -26,6 +28,7 @@
 #include "common/fem/dof_map.hpp"
 #include "common/fem/elasticity.hpp"
 #include "common/fem/stiffness_factor.hpp"
+#include "common/ranks/ranks.hpp"
 #include "common/values/brain_model.hpp"
 #include "common/values/estimate.hpp"
 
@@ -35,20 +38,33 @@ namespace brainshift::contact {
 //
 //   material.tumour    tetrahedra whose centre lies inside the tumour's surface
 //   material.regions   tetrahedra of a label of the mesh (ventricles, white matter, tentorium)
+//   material.tissues   tetrahedra whose tissue the label map told (values/brain_model.hpp)
 //   the rest           material itself
-// The tumour has precedence over the regions. Density, permeability and storage are the same
+// The tumour has precedence over the regions, and they over the tissues. Density, permeability and storage are the same
 // everywhere.
+
+// The pairs of the model's slaves: with the skull (search_contact), then with the sheets of falx and
+// tentorium, whose gaps and normals the model holds.
+Result<std::vector<ContactPair>> contact_pairs(const BrainModel& model);
 
 // kInvalidArgument: a label that the mesh does not have; the sentence names the labels it has.
 // kEmptySet: no tetrahedron has its centre in the tumour.
 Result<fem::MaterialMap> tissue_map(const BrainModel& model, const Material& material);
 
+// Processes that hold one factor together, and whose part each node is (DistributedCholesky).
+struct SharedNodes {
+  Ranks* ranks = nullptr;  // nullptr: this process alone
+  std::vector<int> part;
+};
+
 class ForwardModel {
  public:
   // kFloatingBody, kSingularMatrix, kNotFinite: as StiffnessFactor. kEmptySet and
   // kDegenerateMesh: as search_contact. kInvalidArgument and kEmptySet: as tissue_map.
+  // kInvalidArgument: pressure by several processes.
   static Result<ForwardModel> build(const BrainModel& model, const CaseConfig& config,
-                                    Boundary boundary, const Progress& progress = {});
+                                    Boundary boundary, const Progress& progress = {},
+                                    const SharedNodes& shared = {});
 
   // Drained elasticity on linear or quadratic elements, with the constraints and the contact of the
   // caller. The pairs' slaves are nodes of the space, free and with the identity frame. Vertices of

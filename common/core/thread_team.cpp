@@ -2,6 +2,7 @@
 #include "common/core/thread_team.hpp"
 
 #include <algorithm>
+#include <exception>
 
 namespace brainshift {
 namespace {
@@ -35,13 +36,27 @@ ThreadTeam::ThreadTeam(int members) {
 ThreadTeam::~ThreadTeam() { end(stopped_, round_, threads_); }
 
 void ThreadTeam::run(Function function, void* context) {
-  function_ = function;
-  context_ = context;
+  struct Guarded {
+    Function function;
+    void* context;
+    std::atomic<bool> failed{false};
+    std::exception_ptr failure;
+  } guarded{function, context, {}, {}};
+  function_ = [](void* pointer, int member) {
+    auto& task = *static_cast<Guarded*>(pointer);
+    try {
+      task.function(task.context, member);
+    } catch (...) {
+      if (!task.failed.exchange(true)) task.failure = std::current_exception();
+    }
+  };
+  context_ = &guarded;
   busy_ = static_cast<int>(threads_.size());
   ++round_;
   round_.notify_all();
-  function(context, 0);
+  function_(context_, 0);
   for (int left = busy_; left > 0; left = busy_) busy_.wait(left);
+  if (guarded.failure) std::rethrow_exception(guarded.failure);
 }
 
 void ThreadTeam::work(int member) {

@@ -3,7 +3,7 @@
 //
 // Part i of a task always runs on the same member and always covers the same items, so results do
 // not depend on timing. The caller is member 0; the others sleep between tasks. A team has at most
-// 16 members (TasksMax in docker/brainshiftd.service). run() neither allocates nor throws.
+// 16 members (TasksMax in docker/brainshiftd.service). run() itself does not allocate.
 #pragma once
 
 #include <atomic>
@@ -22,8 +22,8 @@ class ThreadTeam {
 
   int size() const { return static_cast<int>(threads_.size()) + 1; }
 
-  // Calls task(member) once for every member in [0, size()) and returns when all are done. Only
-  // one thread at a time may call it, and the task must not throw.
+  // Calls task(member) once for every member in [0, size()); ends when all are done, and throws the
+  // first exception that one of them threw. Only one thread at a time may call it.
   template <typename Task>
   void run(Task& task) {
     run([](void* context, int member) { (*static_cast<Task*>(context))(member); }, &task);

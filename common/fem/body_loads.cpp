@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "common/fem/body_loads.hpp"
 
+#include <Eigen/Geometry>
 #include <algorithm>
 #include <cassert>
 
@@ -123,6 +124,17 @@ Points swelling_load(const DisplacementSpace& space, const Material& material,
 
 Points initial_stress_load(const TetMesh& mesh, const std::function<Mat3(const Vec3&)>& stress) {
   return load_of(mesh, [&](int, const Vec3& centroid) { return stress(centroid); });
+}
+
+Points wall_pressure_load(const Points& nodes, const Eigen::Matrix<int, 3, Eigen::Dynamic>& wall,
+                          const std::function<double(const Vec3&)>& pressure) {
+  Points load = Points::Zero(3, nodes.cols());
+  for (const auto& triangle : wall.colwise()) {
+    const Vec3 a = nodes.col(triangle[0]), b = nodes.col(triangle[1]), c = nodes.col(triangle[2]);
+    const Vec3 force = -0.5 * pressure((a + b + c) / 3.0) * (b - a).cross(c - a);
+    for (const int node : triangle) load.col(node) += force / 3.0;
+  }
+  return load;
 }
 
 }  // namespace brainshift::fem

@@ -71,6 +71,9 @@ Result<linalg::SolveQuality> check_rows(const linalg::SymmetricMatrix& lower, do
   if (const linalg::SparseCholesky* drained = factor.drained()) {
     return linalg::check_rows(lower, norm, *drained, b, x, workspace);
   }
+  if (const auto* distributed = factor.distributed()) {
+    return linalg::check_rows(lower, norm, *distributed, b, x);
+  }
   if (x.allFinite()) return linalg::SolveQuality{};
   return tl::unexpected(
       linalg::solve_refusal(b.colwise().sum().transpose(), x.colwise().sum().transpose(), {}));

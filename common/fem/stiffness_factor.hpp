@@ -3,8 +3,9 @@
 //
 //   SparseCholesky   drained elasticity
 //   BiotFactor       one step of consolidation, pressure eliminated
+//   DistributedCholesky  drained elasticity, by several processes that prepare a model together
 //
-// Both are symmetric positive definite in u and can be refactorised with a stiffness of the same
+// All are symmetric positive definite in u and can be refactorised with a stiffness of the same
 // pattern (K_p).
 #pragma once
 
@@ -17,6 +18,7 @@
 #include "common/fem/dof_map.hpp"
 #include "common/linalg/checked_solve.hpp"
 #include "common/linalg/cholesky.hpp"
+#include "common/linalg/distributed_cholesky.hpp"
 #include "common/linalg/symmetric_indefinite.hpp"
 
 namespace brainshift::fem {
@@ -61,18 +63,27 @@ class StiffnessFactor {
 
   explicit StiffnessFactor(linalg::SparseCholesky factor) : factor_(std::move(factor)) {}
   explicit StiffnessFactor(BiotFactor factor) : factor_(std::move(factor)) {}
+  // Solves when all processes solve; cannot be refactorised.
+  explicit StiffnessFactor(linalg::DistributedCholesky factor) : factor_(std::move(factor)) {}
 
-  // The factor of drained elasticity; nullptr for one with pressure.
+  // The factor of drained elasticity in this process alone, else nullptr.
   const linalg::SparseCholesky* drained() const {
     return std::get_if<linalg::SparseCholesky>(&factor_);
+  }
+  const linalg::DistributedCholesky* distributed() const {
+    return std::get_if<linalg::DistributedCholesky>(&factor_);
   }
 
   // As SparseCholesky. With pressure, a solve that fails its checks is NaN everywhere.
   Status refactorise(const linalg::SymmetricMatrix& stiffness) {
-    return std::visit([&](auto& f) { return f.refactorise(stiffness); }, factor_);
+    if (auto* cholesky = std::get_if<linalg::SparseCholesky>(&factor_)) {
+      return cholesky->refactorise(stiffness);
+    }
+    return std::get<BiotFactor>(factor_).refactorise(stiffness);
   }
   StiffnessFactor clone_analysis() const {
-    return std::visit([](const auto& f) { return StiffnessFactor(f.clone_analysis()); }, factor_);
+    if (const auto* cholesky = drained()) return StiffnessFactor(cholesky->clone_analysis());
+    return StiffnessFactor(std::get<BiotFactor>(factor_).clone_analysis());
   }
   void solve(const VecX& b, VecX& x) const {
     std::visit([&](const auto& f) { f.solve(b, x); }, factor_);
@@ -85,6 +96,8 @@ class StiffnessFactor {
   void solve_rows(const Eigen::MatrixXd& b, Eigen::MatrixXd& x, Workspace& workspace) const {
     if (const auto* cholesky = std::get_if<linalg::SparseCholesky>(&factor_)) {
       cholesky->solve_rows(b, x, workspace);
+    } else if (const auto* parts = distributed()) {
+      parts->solve_rows(b, x);
     } else {
       std::get<BiotFactor>(factor_).solve_rows(b, x);
     }
@@ -110,7 +123,7 @@ class StiffnessFactor {
   }
 
  private:
-  std::variant<linalg::SparseCholesky, BiotFactor> factor_;
+  std::variant<linalg::SparseCholesky, BiotFactor, linalg::DistributedCholesky> factor_;
 };
 
 // x = K^-1 b, as linalg::checked_solve. With pressure the matrix of the factor is never formed.

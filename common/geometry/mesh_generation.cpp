@@ -36,7 +36,8 @@ using Criteria = CGAL::Mesh_criteria_3<Triangulation>;
 
 constexpr double kFacetAngle_deg = 25.0;         // CGAL's guarantee needs at most 30
 constexpr double kFacetDistanceOverEdge = 0.15;  // surface approximation error over edge
-constexpr double kCellRadiusEdgeRatio = 2.2;     // CGAL's guarantee needs more than 2
+constexpr double kLooseDistanceOverEdge = 0.67;
+constexpr double kCellRadiusEdgeRatio = 2.2;  // CGAL's guarantee needs more than 2
 
 // CGAL bounds circumradii from above; users give edge lengths. With these ratios of bound to
 // target the mean edge of the mesh is the target within a few per cent (measured on balls and on
@@ -48,6 +49,11 @@ constexpr double kFacetRadiusOverEdge = 0.74;
 constexpr double kSurfaceTolerance = 1e-5;
 constexpr unsigned kSeed = 20090529;
 
+struct Division {
+  const RegionField& region;
+  const std::function<bool(int, int)>& loose;
+};
+
 // The sizing field as CGAL asks for it, times a factor.
 struct ScaledField {
   using FT = Kernel::FT;
@@ -56,10 +62,15 @@ struct ScaledField {
 
   const SizingField* edge_mm;
   double factor;
+  const Division* division = nullptr;  // with it `factor` does not hold on loose interfaces
 
-  FT operator()(const Point_3& p, int /*dimension*/, const Index& /*index*/) const {
+  FT operator()(const Point_3& p, int dimension, const Index& index) const {
     const double edge = (*edge_mm)(Vec3(p.x(), p.y(), p.z()));
     assert(std::isfinite(edge) && edge > 0.0);
+    if (division != nullptr && dimension == 2) {
+      const auto [a, b] = boost::get<Domain::Surface_patch_index>(index);
+      if (a > 0 && b > 0 && division->loose(a, b)) return kLooseDistanceOverEdge * edge;
+    }
     return factor * edge;
   }
 };
@@ -120,7 +131,8 @@ std::optional<Enclosure> enclose(const VoxelImage& mask, float level) {
   return result;
 }
 
-Complex refine(const VoxelImage& smooth_mask, const Enclosure& enclosure,
+// division: null for a domain of one region.
+Complex refine(const VoxelImage& smooth_mask, const Enclosure& enclosure, const Division* division,
                const SizingField& edge_mm, const MeshingOptions& options,
                const Progress& progress) {
   namespace p = CGAL::parameters;
@@ -131,20 +143,30 @@ Complex refine(const VoxelImage& smooth_mask, const Enclosure& enclosure,
   };
   CGAL::get_default_random() = CGAL::Random(kSeed);
   CGAL::Random rays(kSeed);
-  const Domain domain = Domain::create_implicit_mesh_domain(
-      outside_positive, enclosure.bbox(), p::relative_error_bound = kSurfaceTolerance,
-      p::p_rng = &rays);
+  const auto region_at = [&](const Kernel::Point_3& x) {
+    return outside_positive(x) > 0.0 ? 0 : division->region(Vec3(x.x(), x.y(), x.z()));
+  };
+  const Domain domain = division == nullptr
+                            ? Domain::create_implicit_mesh_domain(
+                                  outside_positive, enclosure.bbox(),
+                                  p::relative_error_bound = kSurfaceTolerance, p::p_rng = &rays)
+                            : Domain(region_at, enclosure.bbox(),
+                                     p::relative_error_bound = kSurfaceTolerance, p::p_rng = &rays);
   const ScaledField facet_radius{&edge_mm, kFacetRadiusOverEdge};
   const ScaledField cell_radius{&edge_mm, kCellRadiusOverEdge};
-  const ScaledField facet_distance{&edge_mm, kFacetDistanceOverEdge};
+  const ScaledField facet_distance{&edge_mm, kFacetDistanceOverEdge, division};
   const Criteria criteria(p::facet_angle = kFacetAngle_deg, p::facet_size = facet_radius,
                           p::facet_distance = facet_distance,
                           p::cell_radius_edge_ratio = kCellRadiusEdgeRatio,
                           p::cell_size = cell_radius);
 
   report(progress, "mesh: refine", 0.0);
-  Complex complex =
-      CGAL::make_mesh_3<Complex>(domain, criteria, p::no_perturb(), p::no_exude(), p::manifold());
+  // Interfaces that meet are no manifolds.
+  Complex complex = division == nullptr
+                        ? CGAL::make_mesh_3<Complex>(domain, criteria, p::no_perturb(),
+                                                     p::no_exude(), p::manifold())
+                        : CGAL::make_mesh_3<Complex>(domain, criteria, p::no_perturb(),
+                                                     p::no_exude(), p::non_manifold());
   if (!(options.sliver_bound_deg > 0.0)) return complex;
   report(progress, "mesh: perturb", 0.5);
   CGAL::perturb_mesh_3(complex, domain, p::sliver_bound = options.sliver_bound_deg);
@@ -153,7 +175,7 @@ Complex refine(const VoxelImage& smooth_mask, const Enclosure& enclosure,
   return complex;
 }
 
-TetMesh extract(const Complex& complex) {
+TetMesh extract(const Complex& complex, bool labelled) {
   TetMesh mesh;
   const auto count = static_cast<Eigen::Index>(complex.number_of_cells_in_complex());
   mesh.tets.resize(4, count);
@@ -161,13 +183,15 @@ TetMesh extract(const Complex& complex) {
   std::vector<Vec3> nodes;
   Eigen::Index t = 0;
   for (auto cell = complex.cells_in_complex_begin(); cell != complex.cells_in_complex_end();
-       ++cell, ++t)
+       ++cell, ++t) {
+    if (labelled) mesh.labels.push_back(complex.subdomain_index(cell));
     for (int a = 0; a < 4; ++a) {
       const auto vertex = cell->vertex(a);
       const auto [entry, added] = index.try_emplace(vertex, static_cast<int>(nodes.size()));
       if (added) nodes.emplace_back(vertex->point().x(), vertex->point().y(), vertex->point().z());
       mesh.tets(a, t) = entry->second;
     }
+  }
   mesh.nodes.resize(3, static_cast<Eigen::Index>(nodes.size()));
   for (std::size_t n = 0; n < nodes.size(); ++n)
     mesh.nodes.col(static_cast<Eigen::Index>(n)) = nodes[n];
@@ -181,9 +205,13 @@ void keep_largest_component(TetMesh& mesh) {
                                         parts.sizes.begin());
   Eigen::Index kept = 0;
   for (Eigen::Index t = 0; t < mesh.tets.cols(); ++t)
-    if (parts.component_of_tet[static_cast<std::size_t>(t)] == largest)
+    if (parts.component_of_tet[static_cast<std::size_t>(t)] == largest) {
+      if (!mesh.labels.empty())
+        mesh.labels[static_cast<std::size_t>(kept)] = mesh.labels[static_cast<std::size_t>(t)];
       mesh.tets.col(kept++) = mesh.tets.col(t).eval();
+    }
   mesh.tets.conservativeResize(4, kept);
+  if (!mesh.labels.empty()) mesh.labels.resize(static_cast<std::size_t>(kept));
 }
 
 // Interleaves the bits of three 21-bit coordinates.
@@ -232,9 +260,10 @@ void renumber_nodes(TetMesh& mesh) {
 
 // One canonical form per tetrahedron (lowest node first, positive), sorted.
 void sort_tets(TetMesh& mesh) {
-  std::vector<std::array<int, 4>> tets(static_cast<std::size_t>(mesh.num_tets()));
+  std::vector<std::pair<std::array<int, 4>, int>> tets(static_cast<std::size_t>(mesh.num_tets()));
   for (std::size_t t = 0; t < tets.size(); ++t) {
-    auto& tet = tets[t];
+    auto& [tet, label] = tets[t];
+    if (!mesh.labels.empty()) label = mesh.labels[t];
     for (int a = 0; a < 4; ++a)
       tet[static_cast<std::size_t>(a)] = mesh.tets(a, static_cast<Eigen::Index>(t));
     std::sort(tet.begin(), tet.end());
@@ -245,21 +274,23 @@ void sort_tets(TetMesh& mesh) {
     if (a.cross(b).dot(c) < 0.0) std::swap(tet[2], tet[3]);
   }
   std::sort(tets.begin(), tets.end());
-  for (std::size_t t = 0; t < tets.size(); ++t)
-    mesh.tets.col(static_cast<Eigen::Index>(t)) = Eigen::Map<Eigen::Vector4i>(tets[t].data());
+  for (std::size_t t = 0; t < tets.size(); ++t) {
+    mesh.tets.col(static_cast<Eigen::Index>(t)) = Eigen::Map<Eigen::Vector4i>(tets[t].first.data());
+    if (!mesh.labels.empty()) mesh.labels[t] = tets[t].second;
+  }
 }
 
-}  // namespace
-
-Result<TetMesh> mesh_mask(const VoxelImage& smooth_mask, const SizingField& edge_mm,
-                          const MeshingOptions& options, const Progress& progress) {
+Result<TetMesh> mesh_domain(const VoxelImage& smooth_mask, const Division* division,
+                            const SizingField& edge_mm, const MeshingOptions& options,
+                            const Progress& progress) {
   const auto enclosure = enclose(smooth_mask, options.level);
   if (!enclosure)
     return fail(ErrorCode::kEmptySet,
                 fmt::format("mask: no voxel is > {} after smoothing", options.level));
   TetMesh mesh;
   try {
-    mesh = extract(refine(smooth_mask, *enclosure, edge_mm, options, progress));
+    mesh = extract(refine(smooth_mask, *enclosure, division, edge_mm, options, progress),
+                   division != nullptr);
   } catch (const CGAL::Failure_exception& failure) {
     return fail(ErrorCode::kDegenerateMesh,
                 fmt::format("mesh generation failed: {} does not hold", failure.expression()));
@@ -273,6 +304,20 @@ Result<TetMesh> mesh_mask(const VoxelImage& smooth_mask, const SizingField& edge
     return fail(status.error().code, "generated " + status.error().message);
   report(progress, "mesh: done", 1.0);
   return mesh;
+}
+
+}  // namespace
+
+Result<TetMesh> mesh_mask(const VoxelImage& smooth_mask, const SizingField& edge_mm,
+                          const MeshingOptions& options, const Progress& progress) {
+  return mesh_domain(smooth_mask, nullptr, edge_mm, options, progress);
+}
+
+Result<TetMesh> mesh_regions(const VoxelImage& smooth_mask, const RegionField& region,
+                             const std::function<bool(int, int)>& loose, const SizingField& edge_mm,
+                             const MeshingOptions& options, const Progress& progress) {
+  const Division division{region, loose};
+  return mesh_domain(smooth_mask, &division, edge_mm, options, progress);
 }
 
 }  // namespace brainshift::geometry

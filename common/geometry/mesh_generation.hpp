@@ -28,11 +28,22 @@ struct MeshingOptions {
   double sliver_bound_deg = 12.0;
 };
 
+// Region of a point of the domain, > 0.
+using RegionField = std::function<int(const Vec3&)>;
+
 // Nodes are numbered along a Morton (Z-order) curve and tetrahedra by their lowest node, so that
 // neighbours in space are neighbours in memory. Only the largest component (connected by faces)
 // is kept, without unused nodes.
 // kEmptySet: the domain is empty. kDegenerateMesh: the largest component fails check_mesh.
 Result<TetMesh> mesh_mask(const VoxelImage& smooth_mask, const SizingField& edge_mm,
                           const MeshingOptions& options = {}, const Progress& progress = {});
+
+// The same domain divided into regions: no tetrahedron has nodes on both sides of an interface, and
+// mesh.labels holds the regions. An interface for which `loose` is true is met to two thirds of an
+// edge length, the outer surface and the others to 0.15 of it. Where three regions meet, and so
+// perhaps at the outer surface, the surfaces need not be manifolds.
+Result<TetMesh> mesh_regions(const VoxelImage& smooth_mask, const RegionField& region,
+                             const std::function<bool(int, int)>& loose, const SizingField& edge_mm,
+                             const MeshingOptions& options = {}, const Progress& progress = {});
 
 }  // namespace brainshift::geometry

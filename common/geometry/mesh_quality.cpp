@@ -10,30 +10,6 @@
 #include <numeric>
 
 namespace brainshift::geometry {
-namespace {
-
-struct ComponentFace {
-  std::array<int, 3> nodes;  // increasing
-  int tet;
-};
-
-std::vector<ComponentFace> sorted_faces(const Eigen::Matrix<int, 4, Eigen::Dynamic>& tets) {
-  std::vector<ComponentFace> faces;
-  faces.reserve(4 * static_cast<std::size_t>(tets.cols()));
-  for (int t = 0; t < static_cast<int>(tets.cols()); ++t)
-    for (int omit = 0; omit < 4; ++omit) {
-      ComponentFace face{
-          {tets((omit + 1) % 4, t), tets((omit + 2) % 4, t), tets((omit + 3) % 4, t)}, t};
-      std::sort(face.nodes.begin(), face.nodes.end());
-      faces.push_back(face);
-    }
-  std::sort(faces.begin(), faces.end(),
-            [](const ComponentFace& a, const ComponentFace& b) { return a.nodes < b.nodes; });
-  return faces;
-}
-
-constexpr std::array<std::array<int, 2>, 6> kEdges = {
-    {{0, 1}, {0, 2}, {0, 3}, {1, 2}, {1, 3}, {2, 3}}};
 
 double tet_volume(const TetMesh& mesh, int tet) {
   const auto nodes = mesh.tets.col(tet);
@@ -43,6 +19,25 @@ double tet_volume(const TetMesh& mesh, int tet) {
   const Vec3 c = mesh.nodes.col(nodes[3]) - x0;
   return a.cross(b).dot(c) / 6.0;
 }
+
+std::vector<MeshFace> sorted_faces(const Eigen::Matrix<int, 4, Eigen::Dynamic>& tets) {
+  std::vector<MeshFace> faces;
+  faces.reserve(4 * static_cast<std::size_t>(tets.cols()));
+  for (int t = 0; t < static_cast<int>(tets.cols()); ++t)
+    for (int omit = 0; omit < 4; ++omit) {
+      MeshFace face{{tets((omit + 1) % 4, t), tets((omit + 2) % 4, t), tets((omit + 3) % 4, t)}, t};
+      std::sort(face.nodes.begin(), face.nodes.end());
+      faces.push_back(face);
+    }
+  std::sort(faces.begin(), faces.end(),
+            [](const MeshFace& a, const MeshFace& b) { return a.nodes < b.nodes; });
+  return faces;
+}
+
+namespace {
+
+constexpr std::array<std::array<int, 2>, 6> kEdges = {
+    {{0, 1}, {0, 2}, {0, 3}, {1, 2}, {1, 3}, {2, 3}}};
 
 double longest_edge(const TetMesh& mesh, int tet) {
   double longest = 0.0;
@@ -93,8 +88,8 @@ Status check_volumes(const TetMesh& mesh) {
 // Tetrahedra that overlap count their tissue twice. Two on one side of a face overlap; a
 // tetrahedron that is there twice has this on all of its faces.
 Status check_overlap(const TetMesh& mesh) {
-  const std::vector<ComponentFace> faces = sorted_faces(mesh.tets);
-  const auto side = [&mesh](const ComponentFace& face) {
+  const std::vector<MeshFace> faces = sorted_faces(mesh.tets);
+  const auto side = [&mesh](const MeshFace& face) {
     const auto nodes = mesh.tets.col(face.tet);
     Vec3 centre = Vec3::Zero();
     for (const int n : nodes) centre += 0.25 * mesh.nodes.col(n);
@@ -155,7 +150,7 @@ TetComponents tet_components(const Eigen::Matrix<int, 4, Eigen::Dynamic>& tets) 
     }
     return t;
   };
-  const std::vector<ComponentFace> faces = sorted_faces(tets);
+  const std::vector<MeshFace> faces = sorted_faces(tets);
   for (std::size_t f = 1; f < faces.size(); ++f) {
     if (faces[f].nodes != faces[f - 1].nodes) continue;
     const int a = root(faces[f].tet);

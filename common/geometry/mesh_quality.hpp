@@ -4,12 +4,24 @@
 
 #include <Eigen/Core>
 
+#include <array>
 #include <vector>
 
 #include "common/core/error.hpp"
 #include "common/core/mesh.hpp"
 
 namespace brainshift::geometry {
+
+// mm^3, negative for an inverted tetrahedron.
+double tet_volume(const TetMesh& mesh, int tet);
+
+// The faces of all tetrahedra in the order of their nodes: a face between two of them stands there
+// twice, one after the other.
+struct MeshFace {
+  std::array<int, 3> nodes;  // increasing
+  int tet;
+};
+std::vector<MeshFace> sorted_faces(const Eigen::Matrix<int, 4, Eigen::Dynamic>& tets);
 
 // Components of a tetrahedral mesh that are connected by faces. Parts that share only a node or
 // an edge could turn about it like a hinge: for elasticity they are separate bodies.

@@ -155,17 +155,22 @@ Triangles boundary_triangles(const TetMesh& mesh, std::vector<int>* tet_of_trian
 }
 
 TriangleSurface boundary_surface(const TetMesh& mesh, std::vector<NodeIndex>* node_of_vertex) {
+  return surface_of(mesh.nodes, boundary_triangles(mesh), node_of_vertex);
+}
+
+TriangleSurface surface_of(const Points& positions, const Triangles& triangles,
+                           std::vector<NodeIndex>* node_of_vertex) {
   TriangleSurface surface;
-  surface.triangles = boundary_triangles(mesh);
+  surface.triangles = triangles;
   std::vector<NodeIndex> nodes(surface.triangles.data(),
                                surface.triangles.data() + surface.triangles.size());
   std::sort(nodes.begin(), nodes.end());
   nodes.erase(std::unique(nodes.begin(), nodes.end()), nodes.end());
-  std::vector<int> vertex_of_node(static_cast<std::size_t>(mesh.num_nodes()), -1);
+  std::vector<int> vertex_of_node(static_cast<std::size_t>(positions.cols()), -1);
   for (std::size_t v = 0; v < nodes.size(); ++v) {
     vertex_of_node[static_cast<std::size_t>(nodes[v])] = static_cast<int>(v);
   }
-  surface.vertices = mesh.nodes(Eigen::all, nodes);
+  surface.vertices = positions(Eigen::all, nodes);
   for (int& index : surface.triangles.reshaped())
     index = vertex_of_node[static_cast<std::size_t>(index)];
   if (node_of_vertex) *node_of_vertex = std::move(nodes);
@@ -221,6 +226,11 @@ double enclosed_volume(const TriangleSurface& surface) {
     six_volumes +=
         (surface.vertices.col(surface.triangles(0, t)) - origin).dot(area_vector(surface, t));
   return six_volumes / 6.0;
+}
+
+double growth_of_cavity(const TriangleSurface& wall, const Points& displacement) {
+  const TriangleSurface moved{wall.vertices + displacement, wall.triangles};
+  return enclosed_volume(wall) - enclosed_volume(moved);
 }
 
 double area(const TriangleSurface& surface) {

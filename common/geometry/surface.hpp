@@ -21,6 +21,11 @@ Eigen::Matrix<int, 3, Eigen::Dynamic> boundary_triangles(
 TriangleSurface boundary_surface(const TetMesh& mesh,
                                  std::vector<NodeIndex>* node_of_vertex = nullptr);
 
+// Triangles between nodes of a mesh as a surface of its own, in the same way.
+TriangleSurface surface_of(const Points& nodes,
+                           const Eigen::Matrix<int, 3, Eigen::Dynamic>& triangles,
+                           std::vector<NodeIndex>* node_of_vertex = nullptr);
+
 // The triangles between three of these nodes. Vertices are all of the nodes, in increasing order.
 // positions: 3 x n, mm; triangles: 3 x t node indices; nodes without repetition.
 TriangleSurface surface_between(const Points& positions,
@@ -38,6 +43,9 @@ TriangleSurface offset_surface(const TriangleSurface& surface, double distance_m
 // (mm^2).
 double enclosed_volume(const TriangleSurface& surface);
 double area(const TriangleSurface& surface);
+// By how much a cavity's volume (mm^3) grows when its wall moves. wall: closed, out of the tissue, so
+// that the volume it encloses counts negatively. displacement: 3 x v, mm.
+double growth_of_cavity(const TriangleSurface& wall, const Points& displacement);
 // A third of the area of the triangles at each vertex, mm^2; their sum is area().
 VecX vertex_areas(const TriangleSurface& surface);
 // Sum over the triangles of their areas times their unit normals, mm^2; zero for a closed surface.

@@ -24,14 +24,21 @@ class Condensed final : public Inverter {
   }
   std::uint64_t bytes() const override { return bytes_; }
   const UpdateProfile* profile() const override { return &inverter_.profile(); }
+  std::optional<PosteriorModes> posterior() const override {
+    if (!updated_) return std::nullopt;
+    return inverter_.posterior();
+  }
 
  private:
   Status invert(const SparseData& data, const InversionOptions& options,
                 Estimate& estimate) override {
-    return inverter_.update(data, estimate, options);
+    const Status done = inverter_.update(data, estimate, options);
+    updated_ = done.has_value();
+    return done;
   }
 
   CondensedInverter inverter_;
+  bool updated_ = false;
   std::uint64_t bytes_;  // of the operators, which the inverter shares
 };
 

@@ -43,6 +43,9 @@ class Inverter {
   virtual std::uint64_t bytes() const = 0;
   // How long the stages of the last update took; null for the methods that do not say.
   virtual const UpdateProfile* profile() const { return nullptr; }
+  // What the last update left unknown; empty for the methods that do not compute it, and before an
+  // update.
+  virtual std::optional<PosteriorModes> posterior() const { return std::nullopt; }
 
  private:
   // What the method does: all of update() but the verdict.

@@ -8,6 +8,8 @@
 #include <cassert>
 #include <cmath>
 #include <mutex>
+#include <numeric>
+#include <vector>
 
 #include "common/core/stopwatch.hpp"
 #include "common/linalg/blas.hpp"
@@ -26,9 +28,10 @@ struct Supernode {
   const long* row;
   Eigen::Map<const MatrixXd, 0, Eigen::OuterStride<>> corner, below;
 
-  Supernode(const SupernodalView& l, std::size_t s)
+  // widths: so many columns of each supernode; empty: all.
+  Supernode(const SupernodalView& l, std::size_t s, std::span<const long> widths)
       : first(l.first[s]),
-        width(l.first[s + 1] - first),
+        width(widths.empty() ? l.first[s + 1] - first : widths[s]),
         rest(l.rows[s + 1] - l.rows[s] - width),
         row(l.row_of + l.rows[s] + width),
         corner(l.values + l.at[s], width, width, Eigen::OuterStride<>(width + rest)),
@@ -36,9 +39,10 @@ struct Supernode {
 };
 
 // X L^-T
-void forward(const SupernodalView& l, MatrixXd& x, MatrixXd& scratch) {
+void forward(const SupernodalView& l, MatrixXd& x, MatrixXd& scratch,
+             std::span<const long> widths = {}) {
   for (std::size_t s = 0; s + 1 < l.first.size(); ++s) {
-    const Supernode node(l, s);
+    const Supernode node(l, s, widths);
     auto own = x.middleCols(node.first, node.width);
     if ((own.array() == 0.0).all()) continue;
     blas::solve_lower_transposed_right(node.corner, own);
@@ -50,9 +54,11 @@ void forward(const SupernodalView& l, MatrixXd& x, MatrixXd& scratch) {
 }
 
 // X L^-1
-void backward(const SupernodalView& l, MatrixXd& x, MatrixXd& scratch) {
+void backward(const SupernodalView& l, MatrixXd& x, MatrixXd& scratch,
+              std::span<const long> widths = {}) {
   for (std::size_t s = l.first.size() - 1; s-- > 0;) {
-    const Supernode node(l, s);
+    const Supernode node(l, s, widths);
+    if (node.width == 0) continue;
     auto own = x.middleCols(node.first, node.width);
     if (node.rest > 0) {
       auto others = scratch.leftCols(node.rest);
@@ -63,12 +69,19 @@ void backward(const SupernodalView& l, MatrixXd& x, MatrixXd& scratch) {
   }
 }
 
+void make_room(const SupernodalView& l, Index fields, MatrixXd& scratch,
+               std::span<const long> widths = {}) {
+  Index most = 0;
+  for (std::size_t s = 0; s + 1 < l.first.size(); ++s) {
+    most = std::max(most, Supernode(l, s, widths).rest);
+  }
+  if (scratch.rows() != fields || scratch.cols() < most) scratch.resize(fields, most);
+}
+
 }  // namespace
 
 void substitute(const SupernodalView& l, MatrixXd& x, MatrixXd& scratch) {
-  Index most = 0;
-  for (std::size_t s = 0; s + 1 < l.first.size(); ++s) most = std::max(most, Supernode(l, s).rest);
-  if (scratch.rows() != x.rows() || scratch.cols() < most) scratch.resize(x.rows(), most);
+  make_room(l, x.rows(), scratch);
   forward(l, x, scratch);
   backward(l, x, scratch);
 }
@@ -200,6 +213,36 @@ struct SparseCholesky::Impl {
   mutable Workspace::Impl workspace;  // for solves without a workspace of their own
   std::uint64_t nonzeros = 0;
   double rcond = 0.0, analyse_s = 0.0, factor_s = 0.0;
+  long kept = 0;
+  std::vector<long> widths;  // of each supernode, the columns of unknowns that are not kept
+
+  bool is_kept(long place) const {
+    return static_cast<const long*>(factor->Perm)[place] >= static_cast<long>(factor->n) - kept;
+  }
+  // The kept unknowns' columns reach kept ones only, so they are the last of their supernode.
+  void split_supernodes() {
+    const SupernodalView view = view_of(*factor);
+    for (std::size_t s = 0; s < factor->nsuper; ++s) {
+      long width = 0;
+      while (view.first[s] + width < view.first[s + 1] && !is_kept(view.first[s] + width)) ++width;
+      widths.push_back(width);
+    }
+  }
+  // Nested dissection of the others, then those that are kept.
+  cholmod_factor* analyse(const SymmetricMatrix& lower) {
+    cholmod_sparse view = view_of(lower);
+    if (kept == 0) return cholmod_l_analyze(&view, &common);
+    std::vector<long> order(view.nrow);
+    std::iota(order.begin(), order.end(), 0L);
+    const long others = static_cast<long>(view.nrow) - kept;
+    const SymmetricMatrix inner = lower.topLeftCorner(others, others);
+    cholmod_sparse inner_view = view_of(inner);
+    if (others > 0 && !cholmod_l_metis(&inner_view, nullptr, 0, 1, order.data(), &common)) {
+      return nullptr;
+    }
+    common.method[0].ordering = CHOLMOD_GIVEN;
+    return cholmod_l_analyze_p(&view, order.data(), nullptr, 0, &common);
+  }
 
   Impl() {
     cholmod_l_start(&common);
@@ -222,7 +265,7 @@ SparseCholesky::SparseCholesky(SparseCholesky&&) noexcept = default;
 SparseCholesky& SparseCholesky::operator=(SparseCholesky&&) noexcept = default;
 SparseCholesky::~SparseCholesky() = default;
 
-Result<SparseCholesky> SparseCholesky::factorise(const SymmetricMatrix& lower) {
+Result<SparseCholesky> SparseCholesky::factorise(const SymmetricMatrix& lower, int kept) {
   if (lower.rows() == 0) {
     return fail(ErrorCode::kEmptySet, "stiffness matrix: no unknown is left to solve for");
   }
@@ -231,13 +274,13 @@ Result<SparseCholesky> SparseCholesky::factorise(const SymmetricMatrix& lower) {
   use_single_threaded_blas();
   SparseCholesky cholesky(std::make_unique<Impl>());
   Impl& impl = *cholesky.impl_;
+  impl.kept = kept;
   const Stopwatch watch;
-  cholmod_sparse view = view_of(lower);
   {
     // METIS draws from rand(): two analyses at once would give other orderings than one by one.
     static std::mutex one_at_a_time;
     const std::lock_guard lock(one_at_a_time);
-    impl.factor = cholmod_l_analyze(&view, &impl.common);
+    impl.factor = impl.analyse(lower);
   }
   impl.analyse_s = watch.seconds();
   impl.nonzeros = static_cast<std::uint64_t>(impl.common.lnz);
@@ -247,6 +290,7 @@ Result<SparseCholesky> SparseCholesky::factorise(const SymmetricMatrix& lower) {
                     std::to_string(impl.common.status) + ")");
   }
   if (auto status = cholesky.refactorise(lower); !status) return tl::unexpected(status.error());
+  if (kept > 0) impl.split_supernodes();
   return cholesky;
 }
 
@@ -325,6 +369,69 @@ Eigen::MatrixXd SparseCholesky::solve_rows(const Eigen::MatrixXd& b) const {
   Eigen::MatrixXd x;
   solve_rows(b, x, workspace);
   return x;
+}
+
+void SparseCholesky::reduce_rows(const MatrixXd& b, MatrixXd& g, Workspace& workspace) const {
+  const auto* order = static_cast<const long*>(impl_->factor->Perm);
+  MatrixXd& block = workspace.impl_->block;
+  block.resize(b.rows(), size());
+  for (Index i = 0; i < size(); ++i) {
+    if (order[i] < b.cols()) {
+      block.col(i) = b.col(order[i]);
+    } else {
+      block.col(i).setZero();
+    }
+  }
+  const SupernodalView view = view_of(*impl_->factor);
+  make_room(view, b.rows(), workspace.impl_->scratch, impl_->widths);
+  forward(view, block, workspace.impl_->scratch, impl_->widths);
+  g.resize(b.rows(), impl_->kept);
+  for (Index i = 0; i < size(); ++i) {
+    if (order[i] >= b.cols()) g.col(order[i] - b.cols()) = block.col(i);
+  }
+}
+
+void SparseCholesky::finish_rows(const MatrixXd& kept, MatrixXd& x, Workspace& workspace) const {
+  const auto* order = static_cast<const long*>(impl_->factor->Perm);
+  MatrixXd& block = workspace.impl_->block;
+  const Index others = size() - impl_->kept;
+  for (Index i = 0; i < size(); ++i) {
+    if (order[i] >= others) block.col(i) = kept.col(order[i] - others);
+  }
+  backward(view_of(*impl_->factor), block, workspace.impl_->scratch, impl_->widths);
+  x.resize(block.rows(), others);
+  for (Index i = 0; i < size(); ++i) {
+    if (order[i] < others) x.col(order[i]) = block.col(i);
+  }
+}
+
+// L_bb L_bb^T, since nothing else of L is in these rows and columns once the others are eliminated.
+MatrixXd SparseCholesky::schur_complement() const {
+  const SupernodalView view = view_of(*impl_->factor);
+  const auto* order = static_cast<const long*>(impl_->factor->Perm);
+  const long others = size() - impl_->kept;
+  MatrixXd factor = MatrixXd::Zero(impl_->kept, impl_->kept);
+  for (std::size_t s = 0; s < impl_->widths.size(); ++s) {
+    const long rows = view.rows[s + 1] - view.rows[s];
+    for (long j = impl_->widths[s]; j < view.first[s + 1] - view.first[s]; ++j) {
+      for (long i = j; i < rows; ++i) {
+        factor(order[view.row_of[view.rows[s] + i]] - others, order[view.first[s] + j] - others) =
+            view.values[view.at[s] + j * rows + i];
+      }
+    }
+  }
+  MatrixXd complement = MatrixXd::Zero(impl_->kept, impl_->kept);
+  blas::subtract_outer(factor, complement);
+  complement *= -1.0;
+  return complement;
+}
+
+void SparseCholesky::drop_kept() {
+  cholmod_factor& factor = *impl_->factor;
+  std::size_t used = impl_->widths.size();
+  while (used > 0 && impl_->widths[used - 1] == 0) --used;
+  const auto numbers = static_cast<std::size_t>(view_of(factor).at[used]);
+  factor.x = cholmod_l_realloc(numbers, sizeof(double), factor.x, &factor.xsize, &impl_->common);
 }
 
 int SparseCholesky::size() const { return static_cast<int>(impl_->factor->n); }

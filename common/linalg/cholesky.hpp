@@ -49,7 +49,8 @@ class SparseCholesky {
 
   // lower: lower triangle, sorted. kInvalidArgument: an entry above the diagonal. kNotFinite.
   // kFloatingBody: a pivot vanished, i.e. not enough support. kSingularMatrix.
-  static Result<SparseCholesky> factorise(const SymmetricMatrix& lower);
+  // kept: so many of the last unknowns are eliminated last (reduce_rows).
+  static Result<SparseCholesky> factorise(const SymmetricMatrix& lower, int kept = 0);
   SparseCholesky(SparseCholesky&&) noexcept;
   SparseCholesky& operator=(SparseCholesky&&) noexcept;
   ~SparseCholesky();
@@ -82,6 +83,17 @@ class SparseCholesky {
   };
   // The same. Thread-safe if every thread has its own workspace.
   void solve_rows(const Eigen::MatrixXd& b, Eigen::MatrixXd& x, Workspace& workspace) const;
+
+  // A solve in two halves about the kept unknowns b of factorise(), i the others. Between the two
+  // the workspace holds what the first one left.
+  //   reduce_rows   G = -K_bi K_ii^-1 B_i     b: k x i, g: k x b
+  //   finish_rows   X_i = K_ii^-1 (B_i - K_ib X_b)
+  void reduce_rows(const Eigen::MatrixXd& b, Eigen::MatrixXd& g, Workspace& workspace) const;
+  void finish_rows(const Eigen::MatrixXd& kept, Eigen::MatrixXd& x, Workspace& workspace) const;
+  // Lower triangle of K_bb - K_bi K_ii^-1 K_ib.
+  Eigen::MatrixXd schur_complement() const;
+  // Frees the columns of the kept unknowns. Afterwards only the two halves of a solve work.
+  void drop_kept();
 
   int size() const;
   double rcond() const;            // CHOLMOD's estimate: squared ratio of extreme pivots of L

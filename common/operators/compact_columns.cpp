@@ -70,7 +70,8 @@ BRAINSHIFT_INLINE void prefetch(const CompactColumns::BlockArrays& block, int co
 }
 
 BRAINSHIFT_INLINE void sum_block(const CompactColumns::BlockArrays& block,
-                                 std::span<const CompactColumns::Term> terms, float* out) {
+                                 std::span<const CompactColumns::Term> terms, float omitted,
+                                 float* out) {
   float sum[CompactColumns::kBlockRows];
   std::fill(sum, sum + CompactColumns::kBlockRows, 0.0F);
   constexpr std::size_t kAhead = 4;
@@ -84,18 +85,25 @@ BRAINSHIFT_INLINE void sum_block(const CompactColumns::BlockArrays& block,
     next = add_scaled(block.words + start.words, length[1], factor, next);
     add_scaled(block.bytes + start.bytes, length[2], factor, next);
   }
-  for (int i = 0; i < block.others; ++i) sum[block.wide + i] *= block.scales[i];
+  int used = block.wide + block.others;  // directions; they are orthonormal
+  for (float rest = omitted * omitted; used > 0; --used) {
+    rest -= sum[used - 1] * sum[used - 1];
+    if (!(rest >= 0.0F)) break;
+  }
+  const int wide = std::min(used, block.wide), others = used - wide;
+  for (int i = 0; i < others; ++i) sum[wide + i] *= block.scales[i];
   std::fill(out, out + block.rows, 0.0F);
-  add_product(block.wide_basis, block.rows, block.wide, sum, out);
-  add_product(block.basis, block.rows, block.others, sum + block.wide, out);
+  add_product(block.wide_basis, block.rows, wide, sum, out);
+  add_product(block.basis, block.rows, others, sum + wide, out);
 }
 BRAINSHIFT_AVX2 void sum_block_avx2(const CompactColumns::BlockArrays& block,
-                                    std::span<const CompactColumns::Term> terms, float* out) {
-  sum_block(block, terms, out);
+                                    std::span<const CompactColumns::Term> terms, float omitted,
+                                    float* out) {
+  sum_block(block, terms, omitted, out);
 }
 void sum_block_anywhere(const CompactColumns::BlockArrays& block,
-                        std::span<const CompactColumns::Term> terms, float* out) {
-  sum_block(block, terms, out);
+                        std::span<const CompactColumns::Term> terms, float omitted, float* out) {
+  sum_block(block, terms, omitted, out);
 }
 
 template <typename List>
@@ -247,9 +255,10 @@ std::span<const NodeIndex> CompactColumns::nodes(int block) const {
   return {parts_.order.data() + at(block).node, static_cast<std::size_t>(at(block).rows / 3)};
 }
 
-void CompactColumns::sum(int block, std::span<const Term> terms, float* out) const {
+void CompactColumns::sum(int block, std::span<const Term> terms, float* out, float omitted) const {
   const BlockArrays arrays = this->arrays(block);
-  have_avx2() ? sum_block_avx2(arrays, terms, out) : sum_block_anywhere(arrays, terms, out);
+  have_avx2() ? sum_block_avx2(arrays, terms, omitted, out)
+              : sum_block_anywhere(arrays, terms, omitted, out);
 }
 
 void CompactColumns::basis(int block, float* out) const {

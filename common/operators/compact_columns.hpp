@@ -108,7 +108,9 @@ class CompactColumns {
     const std::int8_t* bytes = nullptr;
   };
   // out = sum over terms of factor * column, at the rows of the block (3 nodes(block).size()).
-  void sum(int block, std::span<const Term> terms, float* out) const;
+  // omitted: length, over all rows of the block, of what the last directions may be left out of the
+  // sum, in its unit; fewer of them are read then.
+  void sum(int block, std::span<const Term> terms, float* out, float omitted = 0.0F) const;
   // The same where the numbers are wanted one by one: the block's part of a column is basis (3m x
   // rank, column-major) times coefficients (rank).
   void basis(int block, float* out) const;

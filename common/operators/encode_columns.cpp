@@ -5,6 +5,7 @@
 #include <atomic>
 #include <cassert>
 #include <cmath>
+#include <cstring>
 #include <limits>
 #include <numeric>
 #include <type_traits>
@@ -270,6 +271,43 @@ void join(std::vector<Block>& blocks, CompactParts& parts) {
   take(parts.bytes, &Block::bytes);
 }
 
+// Brings the lists of all processes, whose blocks are consecutive, to the first one; one list at a
+// time, freed as it is sent.
+void gather(Ranks& ranks, int own, int end, CompactParts& parts) {
+  const auto all = [&](auto& list) {
+    using Number = std::remove_reference_t<decltype(*list.data())>;
+    std::vector<Ranks::Bytes> to(static_cast<std::size_t>(ranks.size()));
+    const auto* bytes = reinterpret_cast<const std::byte*>(list.data());
+    if (ranks.rank() > 0) {
+      to[0].assign(bytes, bytes + static_cast<std::size_t>(list.size()) * sizeof(Number));
+      list.resize(0);
+    }
+    auto from = ranks.exchange(std::move(to));
+    if (ranks.rank() > 0) return;
+    Index size = list.size();
+    for (const Ranks::Bytes& message : from) {
+      size += static_cast<Index>(message.size() / sizeof(Number));
+    }
+    Index at = list.size();
+    list.conservativeResize(size);
+    for (Ranks::Bytes& message : from) {
+      if (!message.empty()) std::memcpy(list.data() + at, message.data(), message.size());
+      at += static_cast<Index>(message.size() / sizeof(Number));
+      message = {};
+    }
+  };
+  CompactParts::List<int> blocks = parts.blocks.middleCols(own, end - own).reshaped();
+  all(blocks);
+  if (ranks.rank() == 0) parts.blocks.reshaped() = blocks;
+  all(parts.wide_basis);
+  all(parts.basis);
+  all(parts.basis_scales);
+  all(parts.lengths);
+  all(parts.longs);
+  all(parts.words);
+  all(parts.bytes);
+}
+
 // A step for every column of a group; above 0 also where it has no other numbers than 0.
 Status append_steps(const ColumnGroup& group, Eigen::VectorXf& steps) {
   if (!std::isfinite(group.greatest)) {
@@ -312,8 +350,11 @@ SpatialBlocks node_blocks(const Points& nodes) {
 
 Result<CompactColumns> encode_columns(const SpatialBlocks& nodes,
                                       const std::vector<ColumnGroup>& groups, ThreadTeam& team,
-                                      const Progress& progress, const std::stop_token& stop) {
+                                      const Progress& progress, const std::stop_token& stop,
+                                      Ranks* ranks) {
   linalg::use_single_threaded_blas();
+  const int own = ranks != nullptr ? ranks->first(ranks->rank(), nodes.size()) : 0;
+  const int end = ranks != nullptr ? ranks->first(ranks->rank() + 1, nodes.size()) : nodes.size();
   CompactParts parts;
   for (const ColumnGroup& group : groups) {
     if (auto ok = append_steps(group, parts.steps); !ok) return tl::unexpected(ok.error());
@@ -326,7 +367,7 @@ Result<CompactColumns> encode_columns(const SpatialBlocks& nodes,
   std::atomic<int> done{0};
   const Encoder encoder(groups, parts.steps);
   auto task = [&](int member) {
-    for (int b = member; b < nodes.size(); b += team.size()) {
+    for (int b = own + member; b < end; b += team.size()) {
       if (stop.stop_requested()) return;
       const auto at = static_cast<std::size_t>(b);
       auto made = encoder.encode(nodes.block(b), nodes.first[at]);
@@ -338,18 +379,25 @@ Result<CompactColumns> encode_columns(const SpatialBlocks& nodes,
       parts.blocks(0, b) = static_cast<int>(nodes.block(b).size());
       ++done;
       if (member == 0) {
-        report(progress, "compact columns", static_cast<double>(done) / nodes.size());
+        report(progress, "compact columns", static_cast<double>(done) / (end - own));
       }
     }
   };
   report(progress, "compact columns", 0.0);
   team.run(task);
   report(progress, "compact columns", 1.0);
+  Status all;
+  if (done != end - own) all = fail(ErrorCode::kUnavailable, "preparation was stopped");
   for (const Status& status : statuses) {
-    if (!status) return tl::unexpected(status.error());
+    if (!status) all = status;
   }
-  if (done != nodes.size()) return fail(ErrorCode::kUnavailable, "preparation was stopped");
+  if (ranks != nullptr) all = ranks->agree(all);
+  if (!all) return tl::unexpected(all.error());
   join(blocks, parts);
+  if (ranks != nullptr) {
+    gather(*ranks, own, end, parts);
+    if (ranks->rank() > 0) return CompactColumns();
+  }
   return CompactColumns::from_parts(std::move(parts));
 }
 

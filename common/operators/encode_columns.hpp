@@ -24,6 +24,7 @@
 #include "common/core/thread_team.hpp"
 #include "common/core/types.hpp"
 #include "common/operators/compact_columns.hpp"
+#include "common/ranks/ranks.hpp"
 
 namespace brainshift {
 
@@ -67,11 +68,13 @@ SpatialBlocks node_blocks(const Points& nodes);
 
 // groups: one after the other. nodes: node_blocks() of the mesh. Dealt to the team by blocks; the
 // result does not depend on its size. kNotFinite; kUnavailable when stopped; kInternal when
-// kMaxErrorSteps is not kept; errors of the groups. progress: stage "compact columns".
+// kMaxErrorSteps is not kept; errors of the groups. progress: stage "compact columns". ranks:
+// processes that have the same groups at the nodes of their own blocks (Ranks::first); the first
+// one gets the columns, the others get none.
 Result<CompactColumns> encode_columns(const SpatialBlocks& nodes,
                                       const std::vector<ColumnGroup>& groups, ThreadTeam& team,
                                       const Progress& progress = {},
-                                      const std::stop_token& stop = {});
+                                      const std::stop_token& stop = {}, Ranks* ranks = nullptr);
 
 // Rows of the given nodes (3 each, in their order) of the given columns, in single precision.
 // Numbers are rounded as the shape of the request lets them: 6e-8 of the largest of their column.

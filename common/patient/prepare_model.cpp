@@ -1,6 +1,9 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "common/patient/prepare_model.hpp"
 
+#include <fmt/format.h>
+
+#include <algorithm>
 #include <future>
 #include <memory>
 #include <utility>
@@ -28,12 +31,41 @@ Status not_stopped(const PrepareOptions& options) {
   return fail(ErrorCode::kUnavailable, "preparation was stopped");
 }
 
+// The status of a step that every process makes for itself, as all of them see it.
+template <typename T>
+Status agreed(const PrepareOptions& options, const tl::expected<T, Error>& own) {
+  const Status status = own ? Status{} : Status(tl::unexpected(own.error()));
+  return options.ranks != nullptr ? options.ranks->agree(status) : status;
+}
+
+// Each process meshes for itself: what another processor made of it must be the same to the bit.
+Status same_model(const PrepareOptions& options, const BrainModel& model) {
+  if (options.ranks == nullptr) return {};
+  const auto* id = reinterpret_cast<const std::byte*>(model.model_id.data());
+  const Ranks::Bytes own(id, id + model.model_id.size());
+  const auto ids = options.ranks->exchange(
+      std::vector<Ranks::Bytes>(static_cast<std::size_t>(options.ranks->size()), own));
+  const auto differs =
+      std::find_if(ids.begin(), ids.end(), [&](const auto& other) { return other != ids.front(); });
+  if (differs == ids.end()) return {};
+  return fail(ErrorCode::kInternal,
+              fmt::format("process {} made another mesh than the first one; mesh.file gives all "
+                          "the same",
+                          differs - ids.begin()));
+}
+
 // Opens the checkpoint that belongs to this model and case: the contact columns depend on both.
 Status open_checkpoint(const PrepareOptions& options, const CaseConfig& config,
                        const BrainModel& model, PreparedPatient& prepared) {
   if (options.checkpoint.empty()) return {};
-  auto file = io::CheckpointFile::open_or_create(
-      options.checkpoint, fnv1a(model.model_id + io::case_config_text(config)));
+  std::filesystem::path path = options.checkpoint;
+  if (options.ranks != nullptr) path += fmt::format(".{}", options.ranks->rank());
+  const std::uint64_t key = fnv1a(model.model_id + io::case_config_text(config));
+  auto file = io::CheckpointFile::open_or_create(path, key);
+  if (file && options.ranks != nullptr && !file->blocks().empty()) {
+    if (auto ok = file->remove(); !ok) return ok;
+    file = io::CheckpointFile::open_or_create(path, key);
+  }
   if (!file) return tl::unexpected(file.error());
   if (options.on_resume && !file->blocks().empty()) options.on_resume();
   prepared.checkpoint = std::move(*file);
@@ -65,6 +97,7 @@ inversion::BlockStore block_store(io::CheckpointFile& file) {
     if (!file.has(2 * index)) {
       if (auto status = file.append(2 * index, rows); !status) return status;
     }
+    if (compliance.size() == 0) return {};
     return file.has(2 * index + 1) ? Status{} : file.append(2 * index + 1, compliance);
   };
   store.read = [&file](int index, Eigen::Index first, Eigen::MatrixXf& out) {
@@ -80,8 +113,10 @@ using FactorisedLater = std::future<Result<contact::ForwardModel>>;
 constexpr int kMaxNodesForTwoFactors = 40000;
 
 FactorisedLater factorise_beside(const std::shared_ptr<const BrainModel>& model,
-                                 const CaseConfig& config, Boundary boundary) {
-  if (model->mesh.num_nodes() > kMaxNodesForTwoFactors) return {};
+                                 const CaseConfig& config, Boundary boundary,
+                                 const PrepareOptions& options) {
+  const bool one_thread = options.threads == 1 || options.ranks != nullptr;
+  if (model->mesh.num_nodes() > kMaxNodesForTwoFactors || one_thread) return {};
   return std::async(std::launch::async, [model, config, boundary] {
     return contact::ForwardModel::build(*model, config, boundary);
   });
@@ -116,9 +151,10 @@ Status prepare_boundaries(const std::shared_ptr<const BrainModel>& model, const 
   static_assert(kPreparedBoundaries.size() == 2);
   prepared.file.condensed.resize(2);
   const auto [contact, fixed] = kPreparedBoundaries;
-  FactorisedLater beside = factorise_beside(model, config, contact);
+  FactorisedLater beside = factorise_beside(model, config, contact, options);
   auto factorised =
-      PreparedModel::prepare(model, config, fixed, with_prefix(options.progress, to_string(fixed)));
+      PreparedModel::prepare(model, config, fixed, with_prefix(options.progress, to_string(fixed)),
+                             nullptr, options.ranks);
   if (!factorised) return tl::unexpected(factorised.error());
   const auto prior = factorised->shared_prior();
   std::optional<contact::ForwardModel> made;
@@ -135,7 +171,8 @@ Status prepare_boundaries(const std::shared_ptr<const BrainModel>& model, const 
                              prepared);
   }
   auto later = PreparedModel::prepare(model, config, contact,
-                                      with_prefix(options.progress, to_string(contact)), prior);
+                                      with_prefix(options.progress, to_string(contact)), prior,
+                                      options.ranks);
   if (!later) return tl::unexpected(later.error());
   return condense_boundary(std::move(*later), 0, options, prepared);
 }
@@ -148,20 +185,21 @@ Result<PreparedPatient> prepare_model(const CaseConfig& config, const PrepareOpt
   const Stopwatch reading;
   report(options.progress, "read images", 0.0);
   auto recorded = io::record_inputs(config);
-  if (!recorded) return tl::unexpected(recorded.error());
+  if (auto ok = agreed(options, recorded); !ok) return tl::unexpected(ok.error());
   prepared.file.inputs = std::move(*recorded);
   const auto inputs = io::load_case_inputs(config);
-  if (!inputs) return tl::unexpected(inputs.error());
+  if (auto ok = agreed(options, inputs); !ok) return tl::unexpected(ok.error());
   prepared.read_s = reading.seconds();
 
   if (auto status = not_stopped(options); !status) return tl::unexpected(status.error());
   const Stopwatch meshing;
   auto built = anatomy::build_brain_model(*inputs, options.progress, &prepared.notes);
-  if (!built) return tl::unexpected(built.error());
+  if (auto ok = agreed(options, built); !ok) return tl::unexpected(ok.error());
+  if (auto ok = same_model(options, *built); !ok) return tl::unexpected(ok.error());
   const auto model = std::make_shared<BrainModel>(std::move(*built));
   prepared.mesh_s = meshing.seconds();
 
-  if (auto status = open_checkpoint(options, config, *model, prepared); !status) {
+  if (auto status = agreed(options, open_checkpoint(options, config, *model, prepared)); !status) {
     return tl::unexpected(status.error());
   }
   if (auto status = prepare_boundaries(model, config, options, prepared); !status) {

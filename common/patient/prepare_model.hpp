@@ -40,6 +40,10 @@ struct PrepareOptions {
   std::function<void()> on_resume;
   // Threads that condense; 0: as many as cores.
   int threads = 0;
+  // Processes that all call prepare_model() with the same case; each has a thread and a checkpoint
+  // of its own, CHECKPOINT.RANK, from which nothing goes on. The first one's file is whole, the
+  // others' operators lack the responses. nullptr: this process alone.
+  Ranks* ranks = nullptr;
 };
 
 struct PreparedPatient {
@@ -55,7 +59,8 @@ struct PreparedPatient {
 
 // Errors: of io::record_inputs, io::load_case_inputs, anatomy::build_brain_model,
 // PreparedModel::prepare and condense(), which name a key or file; of CheckpointFile; kUnavailable
-// when stopped. An error leaves the blocks that are finished in the checkpoint.
+// when stopped. An error leaves the blocks that are finished in the checkpoint. By several
+// processes: all have the error of the first that has one; kInternal when their models differ.
 Result<PreparedPatient> prepare_model(const CaseConfig& config, const PrepareOptions& options = {});
 
 }  // namespace brainshift::patient

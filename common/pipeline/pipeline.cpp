@@ -5,6 +5,7 @@
 #include <utility>
 
 #include "common/core/stopwatch.hpp"
+#include "common/geometry/surface.hpp"
 #include "common/pipeline/scene.hpp"
 
 namespace brainshift::pipeline {
@@ -25,6 +26,7 @@ Pipeline::Pipeline(const BrainModel& model, const CaseConfig& config, Method met
       evidence_(config_.sensing.max_age_s),
       inverter_(std::move(inverter)),
       another_(std::move(another)) {
+  if (model.ventricle_wall.cols() > 0) ventricles_ = {model.mesh.nodes, model.ventricle_wall};
   blank_.case_id = model.case_id;
   blank_.model_id = model.model_id;
   blank_.method = method;
@@ -87,6 +89,10 @@ Result<Update> Pipeline::answer(const Observation& observation, const RunOptions
   if (auto status = estimate_into(observation, options, update); !status) {
     evidence_.drop(observation.source);
     return tl::unexpected(status.error());
+  }
+  if (ventricles_.num_triangles() > 0 &&
+      estimate.displacement.cols() == ventricles_.num_vertices()) {
+    estimate.ventricle_change_mm3 = geometry::growth_of_cavity(ventricles_, estimate.displacement);
   }
   if (estimate.quality.usable()) {
     evidence_.trust();

@@ -11,6 +11,7 @@
 
 #include <functional>
 #include <memory>
+#include <optional>
 #include <stop_token>
 
 #include "common/configuration/case_config.hpp"
@@ -51,6 +52,12 @@ class Pipeline {
   // Precondition: the observation's numbers are finite (wire::decode_observation).
   Result<Update> run(const Observation& observation, const RunOptions& options = {});
 
+  // What the last update left unknown (inversion::Inverter::posterior).
+  std::optional<inversion::PosteriorModes> posterior() const {
+    return inverter_ ? inverter_->posterior() : std::nullopt;
+  }
+  const RegistrationTargets& targets() const { return targets_; }
+
   // A session begins: forgets what earlier ones observed and estimated.
   void reset();
 
@@ -63,6 +70,7 @@ class Pipeline {
 
   CaseConfig config_;
   RegistrationTargets targets_;
+  TriangleSurface ventricles_;  // their wall, with all nodes of the mesh; empty without
   Update blank_;  // what is the same in every update: names, method, boundary, omissions
 
   Evidence evidence_;

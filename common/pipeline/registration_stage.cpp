@@ -150,6 +150,7 @@ Result<RegisteredObservation> from_boundary(const TumourBoundary& body,
   options.fewest = 3;
   options.measured = "tumour boundary";
   options.surface = "tumour";
+  options.stop = stop;
   const int per_point = options.average_mm > 0.0 ? kMeasuredPerPoint : 1;
   const std::vector<int> used = some_of(alignment->inliers, per_point * options.points);
   auto surface = registration::SurfaceDistances::build(
@@ -186,6 +187,7 @@ Result<RegisteredObservation> from_surface(const CorticalSurface& body,
   options.sd_mm = sd_mm;
   options.pose_sd_mm = sensing.surface_pose_sd_mm;
   options.pose_sd_deg = sensing.surface_pose_sd_deg;
+  options.stop = stop;
   auto surface =
       registration::SurfaceDistances::build(targets.craniotomy, body.surface.vertices, options);
   if (!surface) return tl::unexpected(surface.error());

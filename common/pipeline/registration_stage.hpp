@@ -75,7 +75,7 @@ struct RegistrationTargets {
 // points. The sentence names the observation and the count. Precondition: the observation's numbers
 // are finite, as wire::decode_observation gives them. (Data that are not are rejected further on,
 // by check_data or by registration, with kNotFinite.) The result refers to nothing of the targets
-// but what it shares. kNotConverged: `stop` was requested during an alignment.
+// but what it shares. kNotConverged: `stop` was requested meanwhile.
 Result<RegisteredObservation> register_observation(const Observation& observation,
                                                    const RegistrationTargets& targets,
                                                    const CaseConfig& config,

@@ -114,6 +114,8 @@ std::vector<Omission> prior_omissions(const PriorConfig& prior) {
        prior.resection_weight_sd == 0.0 && prior.resection_stress_sd_pa == 0.0, 0.6, 0.6, tumour},
       {"pull at the opening", "prior.opening_pressure_sd_pa", prior.opening_pressure_sd_pa == 0.0,
        4.4, 1.3},
+      {"instruments on the way to the tumour", "prior.tract_pressure_sd_pa",
+       prior.tract_pressure_sd_pa == 0.0, 1.9, 1.6},
       {"fine residual field", "prior.force_density_sd_n_m3", prior.force_density_sd_n_m3 == 0.0,
        0.1, 0.1, medium},
       {"medium residual field", "prior.medium_density_sd_n_m3", prior.medium_density_sd_n_m3 == 0.0,

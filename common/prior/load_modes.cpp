@@ -135,6 +135,24 @@ void add_brain_volume(const BrainModel& model, const PriorConfig& prior,
   add([&](const Vec3& x) { return (x.z() - middle.z()) / half.z(); });
 }
 
+void add_ventricles(const BrainModel& model, const PriorConfig& prior,
+                    const std::vector<fem::Elasticity>& of_tet, Columns& out) {
+  if (prior.ventricle_volume_strain_sd == 0.0 || model.ventricle_wall.cols() > 0) return;
+  const Vec3 low = model.mesh.nodes.rowwise().minCoeff();
+  const Vec3 extent = model.mesh.nodes.rowwise().maxCoeff() - low;
+  for (const double side : {-1.0, 1.0}) {
+    for (const double ahead : {-1.0, 0.0, 1.0}) {
+      const Vec3 from_middle(side * kVentriclesApart, ahead * kVentricleLength, kVentriclesAbove);
+      const Vec3 centre = low + (from_middle.array() + 0.5).matrix().cwiseProduct(extent);
+      const auto strain = [&](const Vec3& x) {
+        return std::exp(-0.5 * ((x - centre) / (kVentricleWidth * extent.y())).squaredNorm());
+      };
+      out.add(PriorPart::kBrainVolume, prior.ventricle_volume_strain_sd,
+              fem::swelling_load(model.mesh, of_tet, strain));
+    }
+  }
+}
+
 void add_resection(const BrainModel& model, const CaseConfig& config, Columns& out) {
   const Vec3 centre = model.tumour.vertices.rowwise().mean();
   const double radius = std::cbrt(std::abs(geometry::enclosed_volume(model.tumour))) /
@@ -225,10 +243,9 @@ Opening opening_of(const BrainModel& model) {
   return opening;
 }
 
-void add_opening(const BrainModel& model, const PriorConfig& prior, Columns& out) {
-  if (prior.opening_pressure_sd_pa == 0.0) return;
-  const Opening opening = opening_of(model);
-  if (opening.empty()) return;
+void add_opening(const BrainModel& model, const PriorConfig& prior, const Opening& opening,
+                 Columns& out) {
+  if (prior.opening_pressure_sd_pa == 0.0 || opening.empty()) return;
   const auto add = [&](const auto& traction) {
     Points load = Points::Zero(3, model.mesh.num_nodes());
     for (std::size_t i = 0; i < opening.nodes.size(); ++i) {
@@ -246,6 +263,51 @@ void add_opening(const BrainModel& model, const PriorConfig& prior, Columns& out
   }
 }
 
+void add_ventricle_pressure(const BrainModel& model, const PriorConfig& prior, Columns& out) {
+  if (prior.ventricle_pressure_sd_pa == 0.0 || model.ventricle_wall.cols() == 0) return;
+  const double middle =
+      0.5 * (model.mesh.nodes.row(0).minCoeff() + model.mesh.nodes.row(0).maxCoeff());
+  const auto add = [&](const auto& pressure) {
+    out.add(PriorPart::kVentricles, units::stress_from_pa(prior.ventricle_pressure_sd_pa),
+            fem::wall_pressure_load(model.mesh.nodes, model.ventricle_wall, pressure));
+  };
+  add([](const Vec3&) { return 1.0; });
+  add([&](const Vec3& x) { return std::tanh((x.x() - middle) / kMidlineWidth_mm); });
+}
+
+void add_tract(const BrainModel& model, const PriorConfig& prior, const Opening& opening,
+               Columns& out) {
+  if (prior.tract_pressure_sd_pa == 0.0 || opening.empty()) return;
+  const Vec3 way = Vec3(model.tumour.vertices.rowwise().mean()) - opening.centre;
+  if (!(way.norm() > kTractWidth_mm)) return;  // the tumour lies in the opening
+  const Vec3 axis = way.normalized();
+  const auto [first, second] = across(axis);
+  const double pressure = units::stress_from_pa(prior.tract_pressure_sd_pa);
+  const VecX volumes = fem::nodal_volumes(model.mesh);
+  for (int k = 0; k < 3; ++k) {
+    const auto weight = [&](const Vec3& x) {
+      const double depth = axis.dot(x - opening.centre);
+      const double aside = (x - opening.centre - depth * axis).norm() / kTractWidth_mm;
+      return std::max(0.0, 1.0 - std::abs(2.0 * depth / way.norm() - k)) *
+             std::exp(-0.5 * aside * aside);
+    };
+    for (const Mat3& component :
+         {Mat3(first * first.transpose()), Mat3(second * second.transpose()),
+          Mat3(first * second.transpose() + second * first.transpose())}) {
+      out.add(PriorPart::kTract, pressure,
+              fem::initial_stress_load(
+                  model.mesh, [&](const Vec3& x) -> Mat3 { return weight(x) * component; }));
+    }
+    for (const Vec3& direction : {first, second}) {
+      Points load = Points::Zero(3, model.mesh.num_nodes());
+      for (int i = 0; i < model.mesh.num_nodes(); ++i) {
+        load.col(i) = volumes[i] * weight(model.mesh.nodes.col(i)) / kTractWidth_mm * direction;
+      }
+      out.add(PriorPart::kTract, pressure, load);
+    }
+  }
+}
+
 }  // namespace
 
 Result<LoadModes> load_modes(const BrainModel& model, const CaseConfig& config) {
@@ -256,8 +318,12 @@ Result<LoadModes> load_modes(const BrainModel& model, const CaseConfig& config) 
   add_gravity(model, config, columns);
   add_tumour_volume(model, config.prior, of_tet, columns);
   add_brain_volume(model, config.prior, of_tet, columns);
+  add_ventricles(model, config.prior, of_tet, columns);
   add_resection(model, config, columns);
-  add_opening(model, config.prior, columns);
+  const Opening opening = opening_of(model);
+  add_opening(model, config.prior, opening, columns);
+  add_ventricle_pressure(model, config.prior, columns);
+  add_tract(model, config.prior, opening, columns);
   return columns.modes();
 }
 

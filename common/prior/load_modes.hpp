@@ -18,7 +18,13 @@
 //   brain volume           the same strain in the whole brain, theta = 1; with opposite sign in the
 //                          hemispheres, theta = tanh(x / kMidlineWidth_mm) of the distance x from
 //                          the brain's middle to the right; and growing from back to front and from
-//                          below, -1 to 1
+//                          below, -1 to 1; and of the middle, where fluid is drained from the
+//                          ventricles or dammed up in them: theta = exp(-|x - c|^2 / 2 s^2) about
+//                          six places c of them, kVentriclesApart to either side of the brain's
+//                          middle, kVentricleLength in front of it, beside it and behind, and
+//                          kVentriclesAbove it; all in parts of the brain's extent along that axis,
+//                          s = kVentricleWidth of that from back to front. Not where the model has
+//                          ventricles
 //   resection              w = exp(-r^2 / 2 s^2), whose integral over space is the tumour's volume
 //                          (2 pi)^(3/2) s^3. A weight w rho g along each axis, rho g that of tissue
 //                          in air; and an initial stress w sigma0, one of its six components at a
@@ -27,6 +33,16 @@
 //                          middle and kBumpsOfRing around it, at kRing of its half axes, Gaussians
 //                          with standard deviations of kBumpWidth of them. What pulls or presses
 //                          there, a spatula or dura that gives way, does not do so all over
+//   ventricles             pressure on the wall of the ventricles, pressing the tissue outwards: the
+//                          same all over, and tanh(x / kMidlineWidth_mm) of the distance x from the
+//                          brain's middle to the right: fluid is drained from one of the two
+//   tract                  what instruments do on the straight way from the middle of the opening to
+//                          the tumour's centre, of length l. At the depth t l and the distance r
+//                          from the way
+//                            w_k = max(0, 1 - |2 t - k|) exp(-r^2 / 2 s^2),  k = 0, 1, 2,
+//                          s = kTractWidth_mm. An initial stress p w_k in each of the three
+//                          components across the way, which parts tissue or lets it close; and a
+//                          force density p w_k / s in both directions across, which moves it aside
 // Swelling honours the stiffness of tumour and regions (contact::tissue_map). All families have
 // zero mean and their columns are independent.
 #pragma once
@@ -47,6 +63,13 @@ inline constexpr double kTumourVolumeReach_mm = 75.0;
 inline constexpr int kBumpsOfRing = 6;
 inline constexpr double kRing = 0.65, kBumpWidth = 0.45;
 
+// Of the ventricles: of lateral ventricles 13 mm from the midline whose bodies and horns take up
+// half of a brain's length.
+inline constexpr double kVentricleWidth = 0.1, kVentriclesApart = 0.1, kVentricleLength = 0.15,
+                        kVentriclesAbove = 0.05;
+// Of the tract: half the width of a retractor's blade.
+inline constexpr double kTractWidth_mm = 8.0;
+
 struct LoadModes {
   Eigen::MatrixXd columns;    // 3n x k, N, node-major, in the order of the parts
   PerPart<int> of_part = {};  // how many columns belong to each part; 0 for the residual fields
@@ -55,7 +78,7 @@ struct LoadModes {
 };
 
 // Errors of contact::tissue_map, which name the key. A craniotomy without a triangle between three
-// of its nodes has no opening modes.
+// of its nodes has neither opening nor tract modes.
 Result<LoadModes> load_modes(const BrainModel& model, const CaseConfig& config);
 
 // The part that column `column` belongs to when the parts have so many columns. Precondition: there

@@ -59,8 +59,9 @@ namespace {
 // Any fixed number; it makes a replay repeatable.
 constexpr std::uint64_t kSubsetSeed = 20090627;
 
-constexpr int kTrend = 12;       // coefficients of an affine displacement
-constexpr int kTrendRounds = 4;  // of robust weights
+constexpr int kBetweenStops = 1024;  // points
+constexpr int kTrend = 12;           // coefficients of an affine displacement
+constexpr int kTrendRounds = 4;      // of robust weights
 constexpr double kHuber = 1.345;
 // Of the mean diagonal: what no distance shows, such as a turn of a ball, stays zero.
 constexpr double kRidge = 1e-6;
@@ -132,6 +133,9 @@ Result<SurfaceDistances> SurfaceDistances::build(std::shared_ptr<const IndexedPa
   const double sd_mm = std::hypot(options.sd_mm, options.shared_sd_mm);
   const SparseData data =
       made.measure(vertices, measured, VecX::Constant(measured.cols(), sd_mm), &over);
+  if (options.stop.stop_requested()) {
+    return fail(ErrorCode::kNotConverged, options.measured + ": was stopped");
+  }
   if (static_cast<int>(over.size()) < options.fewest) {
     const Vec3 centre = vertices.rowwise().mean();
     const double away = measured.cols() > 0 ? (measured.rowwise().mean() - centre).norm() : 0.0;
@@ -152,6 +156,7 @@ Result<SurfaceDistances> SurfaceDistances::build(std::shared_ptr<const IndexedPa
   made.sd_mm_ = VecX::Constant(made.guiding_.cols(), sd_mm);
   if (options.outline_errors) made.outline_ = outline_errors(data.positions(Eigen::all, guiding));
   if (options.average_mm > 0.0) made.average(data, guiding);
+  made.options_.stop = {};
   return made;
 }
 
@@ -197,6 +202,7 @@ SparseData SurfaceDistances::measure(Points vertices, const Points& measured, co
   data.sd_mm.resize(measured.cols());
   Eigen::Index count = 0;
   for (Eigen::Index i = 0; i < measured.cols(); ++i) {
+    if (i % kBetweenStops == 0 && options_.stop.stop_requested()) break;
     const Vec3 p = measured.col(i);
     const geometry::SurfacePlace closest = deformed.closest(p);
     if (!(closest.distance_mm <= kFarthestPoint_mm) || deformed.on_rim(closest)) continue;

@@ -25,6 +25,7 @@
 #include <Eigen/SparseCore>
 
 #include <memory>
+#include <stop_token>
 #include <string>
 #include <vector>
 
@@ -91,6 +92,7 @@ struct SurfaceDistanceOptions {
   bool outline_errors = false;
   // Fewer points over the surface are an error, in these words.
   int fewest = 10;
+  std::stop_token stop = {};  // looked at by build() among the points
   std::string measured = "cortical surface", surface = "craniotomy";
 };
 
@@ -106,7 +108,7 @@ class SurfaceDistances {
   // measured: 3 x m, mm RAS. T_undeformed_measured: the rigid motion from the measured points to
   // the undeformed surface. kInvalidArgument: fewer than options.fewest points lie over the
   // surface, so moved (the sentence says how many, and how far away their mean is). kNotFinite:
-  // names the point.
+  // names the point. kNotConverged: options.stop was requested.
   static Result<SurfaceDistances> build(
       std::shared_ptr<const IndexedPatch> patch, const Points& measured,
       const SurfaceDistanceOptions& options = {},

@@ -3,7 +3,7 @@
 // 2.6.
 //
 // Made once from a case (MRI, mask, tumour, craniotomy, pose). Everything later is derived from
-// it. The four node sets are disjoint and together are exactly the boundary nodes:
+// it. The four node sets are disjoint and together are exactly the nodes of the outer boundary:
 //   craniotomy, brainstem  stress-free
 //   slaves                 above the second plane; may separate from or touch the skull (contact),
 //                          or are treated like `fixed` under the fixed boundary condition
@@ -19,13 +19,30 @@
 
 namespace brainshift {
 
+// Labels of tetrahedra whose tissue the label map told (mesh.labels); no mesh file has such numbers.
+// 0: brain, not told apart.
+inline constexpr int kWhiteMatter = -2, kGreyMatter = -3, kCerebellumLabel = -8,
+                     kBrainstemLabel = -16;
+
+// Falx and tentorium: fixed sheets in slits of the mesh. Tissue on either side has nodes of its own
+// there. They may leave the sheet and not pass it, by the penalty of contact with the skull; at the
+// free edge of a slit both sides share their nodes. A node where two sheets meet is there twice.
+struct Septa {
+  std::vector<NodeIndex> slaves;
+  Points normals = Points(3, 0);  // per slave: unit, from the sheet into its tissue
+  double gap_mm = 0.0;            // between sheet and slave before surgery
+  // The sheets as triangles between the nodes of each side, oriented out of its tissue.
+  Eigen::Matrix<int, 3, Eigen::Dynamic> triangles = Eigen::Matrix<int, 3, Eigen::Dynamic>(3, 0);
+};
+
 struct BrainModel {
   std::string case_id;
   // Hash of mesh, sets and surfaces; two processes agree on a model if and only if these agree.
   std::string model_id;
 
   TetMesh mesh;
-  // Boundary of the mesh: 3 x t mesh node indices, oriented outwards.
+  // The brain's outer surface: 3 x t mesh node indices, oriented outwards. Slits and cavities are
+  // not of it.
   Eigen::Matrix<int, 3, Eigen::Dynamic> boundary_triangles;
   // Inner surface of the skull (master surface); outward with respect to the brain.
   TriangleSurface skull;
@@ -39,6 +56,11 @@ struct BrainModel {
   std::vector<NodeIndex> brainstem;
   std::vector<NodeIndex> slaves;
   std::vector<NodeIndex> fixed;
+
+  Septa septa;
+  // Wall of the ventricles, which are cavities of the mesh: oriented out of the tissue.
+  Eigen::Matrix<int, 3, Eigen::Dynamic> ventricle_wall =
+      Eigen::Matrix<int, 3, Eigen::Dynamic>(3, 0);
 
   // Unit vector along gravity, RAS.
   Vec3 gravity_direction = Vec3(0, -1, 0);

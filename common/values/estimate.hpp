@@ -66,14 +66,16 @@ enum class PriorPart {
   kBrainVolume,    // the same of the whole brain and of its halves
   kResection,      // removed tissue: its weight, and the stress that it carried
   kOpening,        // pull and pressure at the craniotomy
+  kVentricles,     // pressure on the wall of the ventricles
+  kTract,          // instruments on the way from there to the tumour
   kFine,           // smooth residual field, shortest correlation length
   kMedium,
   kCoarse,  // longest
   kFar,     // what of the medium and coarse fields lies far from where data come from
 };
-inline constexpr int kPriorParts = 12;
+inline constexpr int kPriorParts = 14;
 // "along_gravity", "across_gravity", "gravity_sides", "gravity_ends", "tumour_volume",
-// "brain_volume", "resection", "opening", "fine", "medium", "coarse", "far"
+// "brain_volume", "resection", "opening", "ventricles", "tract", "fine", "medium", "coarse", "far"
 std::string_view to_string(PriorPart part);
 // One value for each part, in units of the case's standard deviations.
 template <typename T>
@@ -82,7 +84,7 @@ using PriorScaleValues = PerPart<double>;
 // The residual fields, one for each correlation length and the far one: the last parts.
 inline constexpr int kRemainders = 4;
 inline constexpr int kLoadParts = kPriorParts - kRemainders;
-inline constexpr PriorScaleValues kAsInTheCase = {1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1};
+inline constexpr PriorScaleValues kAsInTheCase = {1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1};
 
 // One set of strengths, and how probable the data make it.
 struct Hypothesis {
@@ -139,9 +141,9 @@ struct Estimate {
   // n, mm: root mean square over the three components of the standard deviation of a node's
   // displacement. Empty when uncertainty was not computed.
   VecX sd_mm;
-  // n, 0 to 1: how much of a node's variance before the data they took away. 0: the displacement
-  // there is a guess from the prior alone; 1: the data know it. Empty when uncertainty was not
-  // computed, and for methods other than condensed.
+  // n, 0 to 1: how much of a node's standard deviation before the data they took away. 0: the
+  // displacement there is a guess from the prior alone; 1: the data know it. Empty when uncertainty
+  // was not computed, and for methods other than condensed.
   VecX known;
   // Mean of `known` over the region that was prepared for data: about the tumour and under the
   // opening. NaN: not computed.
@@ -172,6 +174,9 @@ struct Estimate {
   // NaN: not measured. Not on the wire.
   double min_nodal_volume_ratio = std::numeric_limits<double>::quiet_NaN();
   int inverted_elements = 0;
+  // By how much the ventricles have grown, mm^3, by their wall as it has moved. NaN: the model has
+  // no ventricles.
+  double ventricle_change_mm3 = std::numeric_limits<double>::quiet_NaN();
   // In the order of the data. Empty for data without named sources.
   std::vector<SourceSummary> sources;
   // Time spent on displacement and sd_mm, part of the inversion's time. Condensed methods only.

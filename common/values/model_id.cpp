@@ -52,6 +52,13 @@ std::string content_hash(const BrainModel& model) {
   hash.add(model.brainstem);
   hash.add(model.slaves);
   hash.add(model.fixed);
+  if (!model.septa.slaves.empty() || model.ventricle_wall.cols() > 0) {
+    hash.add(model.septa.slaves);
+    hash.add(model.septa.normals);
+    hash.add(&model.septa.gap_mm, 1);
+    hash.add(model.septa.triangles);
+    hash.add(model.ventricle_wall);
+  }
   hash.add(model.gravity_direction);
   const double depths[] = {model.fluid_plane_depth_mm, model.slave_plane_depth_mm};
   hash.add(depths, 2);

@@ -78,6 +78,9 @@ void set_estimate(const Estimate& estimate, pb::Update& out) {
   set(estimate.sd_mm, out.mutable_sd_mm());
   out.set_known(to_bytes(estimate.known));
   if (!std::isnan(estimate.region_known)) out.set_region_known(estimate.region_known);
+  if (!std::isnan(estimate.ventricle_change_mm3)) {
+    out.set_ventricle_change_mm3(estimate.ventricle_change_mm3);
+  }
   set_contact(estimate, out.mutable_contact());
   set(estimate.initial_misfit_mm, out.mutable_initial_misfit());
   set(estimate.misfit_mm, out.mutable_misfit());
@@ -181,6 +184,10 @@ Estimate get_estimate(const pb::Update& message, const std::optional<FieldPart>&
       known == 0 || known == nodes, "update.known",
       std::to_string(known) + " values, must be 0 or one per node (" + std::to_string(nodes) + ")");
   estimate.known = from_bytes(message.known());
+  if (message.has_ventricle_change_mm3()) {
+    estimate.ventricle_change_mm3 =
+        checked.number(message.ventricle_change_mm3(), "update.ventricle_change_mm3");
+  }
   if (message.has_region_known()) {
     estimate.region_known = checked.share(message.region_known(), "update.region_known");
   }

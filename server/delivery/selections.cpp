@@ -77,7 +77,11 @@ Selections::Selections(const std::shared_ptr<const BrainModel>& model)
 
 Result<std::vector<NodeIndex>> Selections::nodes_of(const Region& region) {
   const bool of_tumour = std::holds_alternative<TumourRegion>(region);
-  if (of_tumour && distances_under_way_.valid()) tumour_distance_mm_ = distances_under_way_.get();
+  if (of_tumour && tumour_distance_mm_.empty()) {
+    // Without a future to wait for, they are made anew: the one before found no memory.
+    tumour_distance_mm_ = distances_under_way_.valid() ? distances_under_way_.get()
+                                                       : geometry::distances_from_tumour(*model_);
+  }
   auto nodes = geometry::nodes_in_region(*model_, region, tumour_distance_mm_);
   if (!nodes) return fail(nodes.error().code, "choice: " + nodes.error().message);
   return nodes;

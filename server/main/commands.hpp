@@ -9,6 +9,7 @@
 
 #include "common/core/error.hpp"
 #include "common/core/exit_status.hpp"
+#include "common/ranks/ranks.hpp"
 
 namespace brainshift::server {
 
@@ -21,6 +22,8 @@ struct PrepareArguments {
   std::filesystem::path case_file;
   std::filesystem::path out;
   bool json = false;
+  int threads = 0;         // 0: as many as cores; one for each of several processes
+  Ranks* ranks = nullptr;  // processes that prepare it together; the first one writes and prints
 };
 
 // Calls patient::prepare_model, writes the model file, prints a table or one JSON object to stdout.

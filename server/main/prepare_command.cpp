@@ -5,10 +5,13 @@
 #include <sys/resource.h>
 #include <unistd.h>
 
+#include <cstddef>
 #include <cstdio>
+#include <cstring>
 #include <nlohmann/json.hpp>
 #include <string>
 #include <utility>
+#include <vector>
 
 #include "common/core/stopwatch.hpp"
 #include "common/io/config/config_file.hpp"
@@ -24,48 +27,99 @@ namespace {
 using patient::kPreparedBoundaries;
 using patient::PreparedPatient;
 
+// Of one process.
+struct Usage {
+  std::uint64_t peak_memory_bytes = 0, bytes_sent = 0;
+  double processor_s = 0.0, exchange_s = 0.0;
+};
+
 struct Outcome {
   PreparedPatient patient;
+  std::vector<Usage> ranks;
   std::uintmax_t file_bytes = 0;
   double total_s = 0.0;
 };
 
-Result<Outcome> prepare(const PrepareArguments& arguments, ProgressBar& bar) {
-  const Stopwatch whole;
-  patient::PrepareOptions options;
-  options.checkpoint = arguments.out.string() + ".partial";
-  for (const std::filesystem::path& path : {arguments.out, options.checkpoint}) {
+// Of the whole preparation: patient::prepare_model puts the boundary before what it does for it.
+std::string_view step_of(std::string_view stage) {
+  if (stage.starts_with(to_string(Boundary::kFixed))) return "step 2 of 4";
+  return stage.starts_with(to_string(Boundary::kContact)) ? "step 3 of 4" : "step 1 of 4";
+}
+
+// Of this process so far.
+Usage usage_of(const Ranks::Traffic& traffic) {
+  rusage usage{};
+  getrusage(RUSAGE_SELF, &usage);
+  const auto seconds = [](const timeval& time) {
+    return static_cast<double>(time.tv_sec) + 1e-6 * static_cast<double>(time.tv_usec);
+  };
+  return {static_cast<std::uint64_t>(usage.ru_maxrss) * 1024, traffic.bytes_sent,
+          seconds(usage.ru_utime) + seconds(usage.ru_stime), traffic.seconds};
+}
+
+std::vector<Usage> usage_of_all(Ranks* ranks) {
+  if (ranks == nullptr) return {usage_of({})};
+  const Usage own = usage_of(ranks->traffic());
+  const auto* bytes = reinterpret_cast<const std::byte*>(&own);
+  std::vector<Usage> all;
+  for (const auto& message : ranks->exchange(std::vector<Ranks::Bytes>(
+           static_cast<std::size_t>(ranks->size()), Ranks::Bytes(bytes, bytes + sizeof own)))) {
+    std::memcpy(&all.emplace_back(), message.data(), sizeof own);
+  }
+  return all;
+}
+
+Result<CaseConfig> check_arguments(const PrepareArguments& arguments,
+                                   const std::filesystem::path& checkpoint) {
+  for (const std::filesystem::path& path : {arguments.out, checkpoint}) {
     if (auto ok = io::check_output_file("--out", path); !ok) return tl::unexpected(ok.error());
   }
-  const auto config = io::read_case_config(arguments.case_file);
-  if (!config) return tl::unexpected(config.error());
+  auto config = io::read_case_config(arguments.case_file);
+  if (!config) return config;
   if (auto plan = pipeline::plan_scene(*config, Method::kCondensed, Boundary::kContact); !plan) {
     return tl::unexpected(plan.error());
   }
-  options.progress = bar.progress("");
+  return config;
+}
+
+Result<Outcome> prepare(const PrepareArguments& arguments, ProgressBar& bar) {
+  const Stopwatch whole;
+  const auto agreed = [&](const auto& own) {
+    const Status status = own ? Status{} : Status(tl::unexpected(own.error()));
+    return arguments.ranks != nullptr ? arguments.ranks->agree(status) : status;
+  };
+  patient::PrepareOptions options;
+  options.checkpoint = arguments.out.string() + ".partial";
+  const auto config = check_arguments(arguments, options.checkpoint);
+  if (auto ok = agreed(config); !ok) return tl::unexpected(ok.error());
+  const bool first = arguments.ranks == nullptr || arguments.ranks->rank() == 0;
+  options.ranks = arguments.ranks;
+  options.threads = arguments.threads;
+  if (first) {
+    options.progress = [&bar](std::string_view stage, double fraction) {
+      bar.show(step_of(stage), stage, fraction);
+    };
+  }
   options.on_resume = [&] {
     bar.note(fmt::format("going on from {} of an interrupted run", options.checkpoint.string()));
   };
   auto prepared = patient::prepare_model(*config, options);
   if (!prepared) return tl::unexpected(prepared.error());
-  for (const std::string& note : prepared->notes) {
-    bar.note(fmt::format("{}: {}", arguments.case_file.string(), note));
+  if (first) {
+    for (const std::string& note : prepared->notes) {
+      bar.note(fmt::format("{}: {}", arguments.case_file.string(), note));
+    }
   }
-  bar.show("", "write model", 1.0);
-  if (auto written = io::write_model(arguments.out, prepared->file); !written) {
-    return tl::unexpected(written.error());
+  Status written;
+  if (first) {
+    bar.show("step 4 of 4", "write model", 1.0);
+    written = io::write_model(arguments.out, prepared->file);
   }
-  if (auto ok = prepared->checkpoint->remove(); !ok) return tl::unexpected(ok.error());
+  if (auto ok = agreed(written); !ok) return tl::unexpected(ok.error());
+  if (auto ok = agreed(prepared->checkpoint->remove()); !ok) return tl::unexpected(ok.error());
   std::error_code ignored;
-  return Outcome{std::move(*prepared), std::filesystem::file_size(arguments.out, ignored),
-                 whole.seconds()};
-}
-
-// Of this process so far, bytes.
-std::uint64_t peak_memory() {
-  rusage usage{};
-  getrusage(RUSAGE_SELF, &usage);
-  return static_cast<std::uint64_t>(usage.ru_maxrss) * 1024;
+  return Outcome{std::move(*prepared), usage_of_all(arguments.ranks),
+                 std::filesystem::file_size(arguments.out, ignored), whole.seconds()};
 }
 
 nlohmann::json to_json(const Outcome& outcome, const std::filesystem::path& out) {
@@ -100,7 +154,15 @@ nlohmann::json to_json(const Outcome& outcome, const std::filesystem::path& out)
   }
   json["total_s"] = outcome.total_s;
   json["model_file_bytes"] = outcome.file_bytes;
-  json["peak_memory_bytes"] = peak_memory();
+  json["peak_memory_bytes"] = outcome.ranks.front().peak_memory_bytes;
+  json["processor_s"] = outcome.ranks.front().processor_s;
+  for (std::size_t r = 0; outcome.ranks.size() > 1 && r < outcome.ranks.size(); ++r) {
+    const Usage& rank = outcome.ranks[r];
+    json["ranks"].push_back({{"peak_memory_bytes", rank.peak_memory_bytes},
+                             {"bytes_sent", rank.bytes_sent},
+                             {"processor_s", rank.processor_s},
+                             {"exchange_s", rank.exchange_s}});
+  }
   return json;
 }
 
@@ -124,18 +186,26 @@ void print_table(const Outcome& outcome, const std::filesystem::path& out) {
   }
   fmt::print("\nwrote {} ({:.0f} MiB) in {:.1f} s, peak memory {:.2f} GiB\n", out.string(),
              static_cast<double>(outcome.file_bytes) / 1048576.0, outcome.total_s,
-             static_cast<double>(peak_memory()) / 1073741824.0);
+             static_cast<double>(outcome.ranks.front().peak_memory_bytes) / 1073741824.0);
+  for (std::size_t r = 0; outcome.ranks.size() > 1 && r < outcome.ranks.size(); ++r) {
+    fmt::print("process {}: peak memory {:.2f} GiB, sent {:.2f} GiB\n", r,
+               static_cast<double>(outcome.ranks[r].peak_memory_bytes) / 1073741824.0,
+               static_cast<double>(outcome.ranks[r].bytes_sent) / 1073741824.0);
+  }
 }
 
 }  // namespace
 
 int run_prepare(const PrepareArguments& arguments) {
-  ProgressBar bar(isatty(STDERR_FILENO) == 1 ? ProgressBar::Style::kBar
-                  : arguments.json           ? ProgressBar::Style::kSilent
-                                             : ProgressBar::Style::kLines);
+  const bool first = arguments.ranks == nullptr || arguments.ranks->rank() == 0;
+  ProgressBar bar(!first                       ? ProgressBar::Style::kSilent
+                  : isatty(STDERR_FILENO) == 1 ? ProgressBar::Style::kBar
+                  : arguments.json             ? ProgressBar::Style::kSilent
+                                               : ProgressBar::Style::kLines);
   const auto outcome = prepare(arguments, bar);
   bar.clear();
-  if (!outcome) return print_error(outcome.error());
+  if (!outcome) return first ? print_error(outcome.error()) : exit_status(outcome.error().code);
+  if (!first) return kExitSuccess;
   if (arguments.json) {
     fmt::print("{}\n", to_json(*outcome, arguments.out).dump());
   } else {

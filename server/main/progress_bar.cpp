@@ -32,6 +32,8 @@ void ProgressBar::show(std::string_view prefix, std::string_view stage, double f
   const double elapsed_s = std::chrono::duration<double>(now - stage_start_).count();
   const double remaining_s = percent > 0 ? elapsed_s * (100 - percent) / percent : 0.0;
   if (remaining_s >= 2.0) std::fprintf(stderr, ", %.0f s to go", remaining_s);
+  const double total_s = std::chrono::duration<double>(now - start_).count();
+  if (total_s >= 2.0) std::fprintf(stderr, "; %.0f s in all so far", total_s);
   std::fflush(stderr);
   drawn_ = true;
 }

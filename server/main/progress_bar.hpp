@@ -34,6 +34,7 @@ class ProgressBar {
   Style style_;
   bool drawn_ = false;
   int percent_ = -1;
+  const std::chrono::steady_clock::time_point start_ = std::chrono::steady_clock::now();
   std::chrono::steady_clock::time_point stage_start_;
   std::string stage_;
 };

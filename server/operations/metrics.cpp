@@ -85,7 +85,9 @@ void add_session(Families& out, const wire::DaemonReport& report) {
   }
   if (report.session.newest_usable > 0) {
     out.gauge("field_age_seconds", 1e-3 * report.session.age_ms,
-              "Since the arrival of the observation behind the newest usable field.");
+              "Since the data of the newest usable field were acquired.");
+    out.gauge("field_aged", static_cast<int>(report.session.age_of(report.session.age_ms)),
+              "0: within the limits of its age; 1: aged; 2: expired, not to be shown.");
   }
   MetricFamily& updates =
       out.open(MetricType::Counter, "updates_total", "Final updates, by result.");

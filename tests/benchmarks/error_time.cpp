@@ -130,7 +130,8 @@ Result<Prior> papers_prior(const Head& head) {
        {&prior.medium_density_sd_n_m3, &prior.coarse_density_sd_n_m3, &prior.gravity_mode_sd,
         &prior.tumour_volume_strain_sd, &prior.brain_volume_strain_sd, &prior.resection_weight_sd,
         &prior.resection_stress_sd_pa, &prior.opening_pressure_sd_pa, &prior.gravity_sides_sd,
-        &prior.gravity_ends_sd, &prior.broad_weight}) {
+        &prior.gravity_ends_sd, &prior.ventricle_volume_strain_sd, &prior.tract_pressure_sd_pa,
+        &prior.broad_weight}) {
     *other = 0.0;
   }
   auto prepared = inversion::PreparedModel::prepare(head.model, config, Boundary::kContact);

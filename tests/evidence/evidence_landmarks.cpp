@@ -1,11 +1,12 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // evidence_landmarks: landmarks of a real operation, leave-one-out (landmark_study.hpp), with the
-// standard deviation that `brainshift import --landmarks` gives a landmark. Writes a row per
-// landmark.
+// standard deviation that `brainshift import --landmarks` gives a landmark unless --sd says
+// otherwise. Writes a row per pose of the head and landmark.
 #include <CLI/CLI.hpp>
 #include <cstdio>
 #include <filesystem>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "client/tools/import/import_landmarks.hpp"
@@ -24,22 +25,24 @@ namespace fs = std::filesystem;
 struct Arguments {
   fs::path pairs, case_file, out = "landmarks.csv";
   double thousand_nodes = 18.0;
+  double sd_mm = client::LandmarkOptions{}.sd_mm;
 };
 
 constexpr const char* kHeading =
-    "landmark,none_mm,rigid_mm,affine_mm,thin_plate_mm,estimate_mm,estimated_motion_mm,quality";
+    "pose,landmark,none_mm,rigid_mm,affine_mm,thin_plate_mm,estimate_mm,estimated_motion_mm,sd_mm,"
+    "inside_90,quality";
 
-Status write(const std::vector<LeftOutLandmark>& landmarks, const fs::path& out) {
-  auto file = bench::CsvWriter::create(out, kHeading);
-  if (!file) return tl::unexpected(file.error());
+Status write(const std::string& pose, const std::vector<LeftOutLandmark>& landmarks,
+             bench::CsvWriter& file) {
   for (const LeftOutLandmark& one : landmarks) {
-    std::vector<std::string> cells = {one.name};
-    for (const double value :
-         {one.none, one.rigid, one.affine, one.thin_plate, one.estimate, one.motion_mm}) {
+    std::vector<std::string> cells = {pose, one.name};
+    for (const double value : {one.none, one.rigid, one.affine, one.thin_plate, one.estimate,
+                               one.motion_mm, one.sd_mm}) {
       cells.push_back(bench::csv_number(value));
     }
+    cells.push_back(std::to_string(one.inside));
     cells.push_back(one.quality);
-    if (Status ok = file->row(cells); !ok) return ok;
+    if (Status ok = file.row(cells); !ok) return ok;
   }
   return {};
 }
@@ -49,14 +52,21 @@ Status run(const Arguments& arguments) {
   if (!pairs) return tl::unexpected(pairs.error());
   const auto config = surgeries::read_head(arguments.case_file);
   if (!config) return tl::unexpected(config.error());
+  auto file = bench::CsvWriter::create(arguments.out, kHeading);
+  if (!file) return tl::unexpected(file.error());
   const bench::MeshWish wish{config->case_id, arguments.thousand_nodes};
-  const auto head = bench::make_head(*config, wish);
-  if (!head) return tl::unexpected(head.error());
-  const Stopwatch watch;
-  const auto landmarks = leave_one_out(*head, *pairs, client::LandmarkOptions{}.sd_mm);
-  if (!landmarks) return tl::unexpected(landmarks.error());
-  std::fprintf(stderr, "  %.1f s\n", watch.seconds());
-  return write(*landmarks, arguments.out);
+  for (const HeadPose& pose : head_poses(*config)) {
+    const Stopwatch watch;
+    CaseConfig posed = *config;
+    posed.gravity_direction = pose.gravity;
+    const auto head = bench::make_head(std::move(posed), wish);
+    if (!head) return tl::unexpected(head.error());
+    const auto landmarks = leave_one_out(*head, *pairs, arguments.sd_mm);
+    if (!landmarks) return tl::unexpected(landmarks.error());
+    std::fprintf(stderr, "  %s: %.1f s\n", pose.name.c_str(), watch.seconds());
+    if (Status ok = write(pose.name, *landmarks, *file); !ok) return ok;
+  }
+  return {};
 }
 
 }  // namespace
@@ -76,6 +86,9 @@ int main(int argc, char** argv) {
                  "size of the mesh; 18: the case's own edge length")
       ->capture_default_str()
       ->check(CLI::Range(1.0, 1000.0));
+  app.add_option("--sd", arguments.sd_mm, "standard deviation of a landmark, mm")
+      ->capture_default_str()
+      ->check(CLI::PositiveNumber);
   app.add_option("--out", arguments.out, "table to write")->capture_default_str();
   return brainshift::surgeries::run_study(app, argc, argv,
                                           [&] { return brainshift::evidence::run(arguments); });

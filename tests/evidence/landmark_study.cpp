@@ -3,11 +3,13 @@
 
 #include <Eigen/LU>
 #include <Eigen/QR>
+#include <cmath>
 #include <utility>
 
 #include "common/inversion/inverter.hpp"
 #include "common/pipeline/pipeline.hpp"
 #include "common/registration/fiducials.hpp"
+#include "tests/surgeries/interval_scores.hpp"
 
 namespace brainshift::evidence {
 namespace {
@@ -58,7 +60,8 @@ class Predictor {
     return Predictor(head, sd_mm, std::move(*pipeline));
   }
 
-  // Where the estimate from `others` has the landmark, and what it says of itself.
+  // Where the estimate from `others` has the landmark, and what it says of itself: all of `out`
+  // but for the distances and what is inside.
   Result<Vec3> predict(const Pairs& others, const Vec3& before, LeftOutLandmark& out) {
     const auto first = registration::register_fiducials(others.before, others.during);
     if (!first) return tl::unexpected(first.error());
@@ -79,8 +82,12 @@ class Predictor {
     const auto pose = registration::register_fiducials(places, others.during);
     if (!pose) return tl::unexpected(pose.error());
     out.motion_mm = (moved(before) - before).norm();
+    const double sd = geometry::value_at(head_->locator->locate(before), update->estimate.sd_mm);
+    const Vec3 place = pose->T_image_measured * moved(before);
+    const double tre = registration::expected_tre_mm(others.during, std::sqrt(3.0) * sd_mm_, place);
+    out.sd_mm = std::sqrt(sd * sd + tre * tre / 3.0 + sd_mm_ * sd_mm_);
     out.quality = std::string(to_string(update->estimate.quality.quality));
-    return Vec3(pose->T_image_measured * moved(before));
+    return place;
   }
 
  private:
@@ -93,6 +100,10 @@ class Predictor {
 };
 
 }  // namespace
+
+std::vector<HeadPose> head_poses(const CaseConfig& config) {
+  return {{"uppermost", config.gravity_direction}, {"supine", Vec3(0, -1, 0)}};
+}
 
 Result<PointMap> rigid_map(const Points& before, const Points& during) {
   const auto fit = registration::register_fiducials(before, during);
@@ -148,6 +159,7 @@ Result<std::vector<LeftOutLandmark>> leave_one_out(const bench::Head& head,
     const Pairs others = without(all, i);
     LeftOutLandmark& out = result.emplace_back();
     out.name = pairs.names[static_cast<std::size_t>(i)];
+    if (out.name.empty()) out.name = std::to_string(i + 1);
     const auto failed = [&](const Error& error) {
       return fail(error.code, "landmark " + out.name + ": " + error.message);
     };
@@ -161,7 +173,10 @@ Result<std::vector<LeftOutLandmark>> leave_one_out(const bench::Head& head,
     }
     const auto predicted = predictor->predict(others, before, out);
     if (!predicted) return failed(predicted.error());
-    out.estimate = (*predicted - during).norm();
+    const Vec3 error = *predicted - during;
+    out.estimate = error.norm();
+    out.inside =
+        static_cast<int>((error.array().abs() <= surgeries::kNormalQuantile95 * out.sd_mm).count());
   }
   return result;
 }

@@ -39,16 +39,30 @@ Result<PointMap> thin_plate_map(const Points& before, const Points& during);
 //   T   rigid fit of x_j + u(x_j) to y_j: what the update puts down to the pose
 //   y_i is predicted at T (x_i + u(x_i))
 // Nothing of landmark i is read but x_i, and y_i to score.
+//
+// The prediction's own standard deviation, of a component: the update's at x_i, what T is off by
+// there (Fitzpatrick's TRE for landmarks of sd s) and the landmark's own:
+//   sd_i^2 = sd(x_i)^2 + TRE(y_i)^2 / 3 + s^2
 inline constexpr double kLeftPose_mm = 2.0;
 inline constexpr double kLeftPose_deg = 2.0;
 
+// How the patient lay is not published with the landmarks: every study is made with both.
+struct HeadPose {
+  std::string name;
+  Vec3 gravity = Vec3(0, -1, 0);
+};
+// "uppermost": the case's direction of gravity, away from the opening. "supine": (0, -1, 0).
+std::vector<HeadPose> head_poses(const CaseConfig& config);
+
 // Distances from where a landmark was found to where it was predicted, mm.
 struct LeftOutLandmark {
-  std::string name;
+  std::string name;   // or its number, from 1
   double none = 0.0;  // at its place before surgery
   double rigid = 0.0, affine = 0.0, thin_plate = 0.0;
   double estimate = 0.0;
   double motion_mm = 0.0;  // |u| there
+  double sd_mm = 0.0;      // of a component of the prediction
+  int inside = 0;          // components, of three, within the 90 % interval
   std::string quality;     // of the update
 };
 

@@ -40,6 +40,14 @@ std::string proc_file(pid_t pid, const char* name) {
   return "/proc/" + std::to_string(pid) + "/" + name;
 }
 
+double status_number(pid_t pid, const std::string& key) {
+  std::ifstream stream(proc_file(pid, "status"));
+  for (std::string line; std::getline(stream, line);) {
+    if (line.rfind(key, 0) == 0) return std::stod(line.substr(key.size()));
+  }
+  throw std::runtime_error("brainshiftd has ended");
+}
+
 // Key pairs of the daemon and of an admin, and the allow-list that names the admin.
 client::ClientKeys make_keys(const fs::path& folder) {
   fs::remove_all(folder);
@@ -64,6 +72,7 @@ fs::path write_configuration(const DaemonOptions& options) {
     fs::create_directories(options.folder / "journal");
     stream << "journal_dir: " << fs::absolute(options.folder / "journal").string() << "\n";
   }
+  stream << options.more;
   if (options.keys) {
     const std::string keys = fs::absolute(options.folder / "keys").string();
     stream << "security: {secret_key: " << keys << "/daemon.secret, allow_list: " << keys
@@ -158,13 +167,9 @@ int DaemonProcess::end(int signal) {
   return WIFEXITED(status) ? WEXITSTATUS(status) : -1;
 }
 
-double DaemonProcess::resident_mib() const {
-  std::ifstream stream(proc_file(pid_, "status"));
-  for (std::string line; std::getline(stream, line);) {
-    if (line.rfind("VmRSS:", 0) == 0) return std::stod(line.substr(6)) / 1024.0;
-  }
-  throw std::runtime_error("brainshiftd has ended");
-}
+double DaemonProcess::resident_mib() const { return status_number(pid_, "VmRSS:") / 1024.0; }
+
+int DaemonProcess::threads() const { return static_cast<int>(status_number(pid_, "Threads:")); }
 
 double DaemonProcess::cpu_s() const {
   std::ifstream stream(proc_file(pid_, "stat"));

@@ -23,6 +23,7 @@ struct DaemonOptions {
   bool log = true;                            // into folder/daemon.log; false: nowhere
   int max_descriptors = 0;                    // RLIMIT_NOFILE; 0: as this process has it
   std::vector<std::string> environment = {};  // "NAME=value", beside this process's own
+  std::string more = {};                      // lines of its configuration
 };
 
 // One thread at a time. The daemon ends with this object, and with the thread that started it.
@@ -48,6 +49,7 @@ class DaemonProcess {
   double resident_mib() const;
   double cpu_s() const;  // used so far, all threads
   int descriptors() const;
+  int threads() const;
 
  private:
   DaemonOptions options_;

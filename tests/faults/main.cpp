@@ -38,6 +38,15 @@ const std::map<std::string, Topic> kTopics = {
     {"clocks", {run_clocks, "clocks that are wrong", 0, 0, 0, 0}},
     {"cost",
      {run_cost, "latency with journal and keys and without, COUNT updates each", 2000, 20, 0, 0}},
+    {"hang-ups",
+     {run_hang_ups, "COUNT peers of each kind that close with much unread", 1000, 50, 0, 0}},
+    {"choices", {run_choices, "a viewer that changes its choice COUNT times", 100000, 1000, 0, 0}},
+    {"largest", {run_largest, "the largest observations back to back for SECONDS", 0, 0, 60, 2}},
+    {"allocations",
+     {run_allocations, "COUNT allocations that fail, one at a time", 1000, 40, 0, 0}},
+    {"threads",
+     {run_hardware_threads, "2 to 128 hardware threads, COUNT kinds of session on each", 4, 2, 0,
+      0}},
 };
 
 int run_topic(const std::string& name, const Topic& topic, Settings settings, bool brief) {

@@ -47,5 +47,10 @@ void run_crowds(const Settings& settings, Tally& tally);
 void run_restart(const Settings& settings, Tally& tally);
 void run_clocks(const Settings& settings, Tally& tally);
 void run_cost(const Settings& settings, Tally& tally);
+void run_hang_ups(const Settings& settings, Tally& tally);
+void run_choices(const Settings& settings, Tally& tally);
+void run_largest(const Settings& settings, Tally& tally);
+void run_allocations(const Settings& settings, Tally& tally);
+void run_hardware_threads(const Settings& settings, Tally& tally);
 
 }  // namespace brainshift::faults

@@ -79,10 +79,19 @@ def timestamp(seconds):
 
 
 def transform(device, T, valid, seconds):
-    """A TRANSFORM with the status that PlusServer adds."""
+    """A TRANSFORM with the status that PlusServer adds. Of a name above 20 characters the header has the beginning."""
     content = struct.pack(">12f", *T[:3].T.ravel())
     metadata = [("TransformStatus", "OK" if valid else "INVALID")]
-    return igtl_reader.encode(2, "TRANSFORM", device, content, metadata, timestamp(seconds))
+    if len(device) > 20:
+        metadata.append(("IGTL_DEVICE_NAME", device))
+    return igtl_reader.encode(2, "TRANSFORM", device[:20], content, metadata, timestamp(seconds))
+
+
+def tracking_data(tools, seconds):
+    """A TDATA of name to matrix and validity, with the states that PlusServer adds by their whole names."""
+    content = b"".join(struct.pack(">20sBB12f", name[:20].encode(), 1, 0, *T[:3].T.ravel()) for name, (T, _) in tools.items())
+    metadata = [(name + "Status", "OK" if valid else "INVALID") for name, (_, valid) in tools.items()]
+    return igtl_reader.encode(2, "TDATA", "TrackingData", content, metadata, timestamp(seconds))
 
 
 def image(device, size, pixels, seconds):

@@ -37,9 +37,9 @@ def good(done):
     return done
 
 
-def refused(done, *says):
+def refused(done, *says, program=None):
     """Exit status 2, and one line on stderr that begins with the program's name and has these parts."""
-    program = pathlib.Path(done.args[0]).name
+    program = program or pathlib.Path(done.args[0]).name
     assert done.returncode == 2, done.stderr
     assert len(done.stderr.splitlines()) == 1, done.stderr
     assert done.stderr.startswith(program + ": ")

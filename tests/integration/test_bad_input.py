@@ -119,7 +119,6 @@ def test_bad_usage_exits_two_with_one_line(folder):
     prepare, serve_here = ("prepare", "--case", COARSE_CASE), ("serve", "--config", config)
     for arguments, says in (
             ((), "subcommand"),
-            (("dance", ), "dance"),
             (("prepare", ), "--case"),
             (prepare, "--out"),
             ((*prepare, "--out", "m.h5", "--fast"), "--fast"),
@@ -190,6 +189,18 @@ def test_help_teaches_and_version_tells():
     for command in ("prepare", "serve"):
         assert "Examples:" in good(brainshiftd(command, "--help")).stdout
     assert good(brainshiftd("--version")).stdout.startswith("brainshiftd ")
+
+
+def test_a_command_of_the_other_program_is_handed_over():
+    assert "Model file to write" in good(brainshift("prepare", "--help")).stdout
+    assert "Tables, pictures" in good(brainshiftd("report", "--help")).stdout
+
+
+def test_a_slip_is_understood(folder):
+    refused(brainshift("repaly", folder / "s.surgery"), "did you mean replay?")
+    refused(brainshiftd("prepar", "--case", "c.yaml"), "did you mean prepare?")
+    for program in (brainshift, brainshiftd):  # never from one to the other and back
+        refused(program("dance"), "unknown command \"dance\": must be one of init, ", program="brainshift")
 
 
 def test_bad_usage_of_the_client_exits_two_with_one_line(folder):

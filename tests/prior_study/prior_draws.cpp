@@ -55,7 +55,7 @@ class Brains {
   Status add(const VecX& z, bool whole, PartDraws& out) {
     contact_.forget();
     if (auto status = contact_.solve(z); !status) {
-      if (status.error().code != ErrorCode::kNotConverged) return status;
+      if (status.error().code != ErrorCode::kNotConverged) return tl::unexpected(status.error());
       ++out.unsettled;
       return {};
     }

@@ -10,7 +10,7 @@ import time
 
 PROGRAM = shutil.which("chromium")
 FLAGS = ["--headless", "--no-sandbox", "--disable-gpu", "--disable-quic", "--no-first-run", "--disable-background-networking",
-         "--disable-component-update", "--disable-sync", "--remote-debugging-pipe"]
+         "--disable-component-update", "--disable-sync", "--enable-unsafe-swiftshader", "--remote-debugging-pipe"]
 LONG_S = 60.0
 
 
@@ -59,7 +59,8 @@ class Chromium:
                 assert "error" not in answer, answer
                 return answer["result"]
             if answer.get("method") in ("Runtime.exceptionThrown", "Log.entryAdded"):
-                self.complaints.append(answer["params"])
+                if answer["params"].get("entry", {}).get("source") != "rendering":  # that WebGL runs on the processor
+                    self.complaints.append(answer["params"])
 
     def _next(self, method):
         while b"\0" not in self._buffer:

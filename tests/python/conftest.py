@@ -12,6 +12,15 @@ PROGRAMS = pathlib.Path(os.environ["BRAINSHIFT_PROGRAMS"])
 GOLDEN = SOURCE / "tests" / "data" / "wire"
 
 
+def record(study, name, value, bound, holds):
+    """A row for the tables of a study, where one is run (tests/support/study_record.hpp). holds: None for a figure alone."""
+    folder = os.environ.get("BRAINSHIFT_STUDY_DIR")
+    if folder:
+        with open(pathlib.Path(folder) / "checks.csv", "a", encoding="utf-8") as table:
+            passed = "" if holds is None else int(holds)
+            table.write(f"{study},{name},{value:g},{bound},{passed},pytest tests/python/test_{study}.py\n")
+
+
 def golden(name):
     """Bytes of a golden frame and its description."""
     return (GOLDEN / f"{name}.bin").read_bytes(), json.loads((GOLDEN / f"{name}.json").read_text())

@@ -35,6 +35,7 @@ class FakeDaemon:
     def __init__(self, answers):
         self.answers = answers
         self.requests = queue.Queue()  # frames, in order
+        self.peer = None  # that spoke last; of the request that is being answered
         self._commands = queue.Queue()
         self._context = zmq.Context()
         self._socket = self._context.socket(zmq.ROUTER)
@@ -59,7 +60,6 @@ class FakeDaemon:
         self._ringer.send(b"")
 
     def _serve(self):
-        peer = None
         poller = zmq.Poller()
         poller.register(self._socket, zmq.POLLIN)
         poller.register(self._bell, zmq.POLLIN)
@@ -70,13 +70,13 @@ class FakeDaemon:
                 command = self._commands.get_nowait()
                 if command is None:
                     return
-                self._socket.send_multipart([peer, *(command if isinstance(command, tuple) else (command,))])
+                self._socket.send_multipart([self.peer, *(command if isinstance(command, tuple) else (command,))])
             if self._socket in ready:
-                peer, message = self._socket.recv_multipart()
+                self.peer, message = self._socket.recv_multipart()
                 request = frame.decode(message)
                 self.requests.put(request)
                 for kind, request_id, payload in self.answers(request):
-                    self._socket.send_multipart([peer, frame.encode(kind, request_id, payload)])
+                    self._socket.send_multipart([self.peer, frame.encode(kind, request_id, payload)])
 
     def __enter__(self):
         return self

@@ -27,7 +27,7 @@ def test_a_head_is_prepared_operated_on_and_scored(tmp_path):
     assert 0.5 < float(rows[0]["coverage_90"]) <= 1.0
     assert rows[1]["tumour_error_mm"] == "n/a" and rows[1]["quality"] in ("good", "caution")
     page = (tmp_path / "a" / "sub-01" / "sub-01_report.html").read_text()
-    assert "joint-sag" in page and "data:image/png" in page
+    assert "joint-sag" in page and "data:image/" in page
 
     for name in "bc":
         (beside / f"sub-01_acq-{name}_landmarks.csv").unlink()

@@ -6,6 +6,7 @@ import itertools
 import numpy as np
 import pytest
 
+import brainshift
 from brainshift import Field, FieldMesh, Quality, codec
 from fake_daemon import update as wire_update
 
@@ -103,3 +104,12 @@ def test_another_model_and_a_wrong_shape_are_refused():
         Field(MESH, dataclasses.replace(bent(), session=other.session))
     with pytest.raises(ValueError, match=r"shape \(3,\), must be \(m, 3\)"):
         Field(MESH, bent()).at([1.0, 2.0, 3.0])
+
+
+def test_what_holds_arrays_is_shown_on_one_line():
+    shown = repr(bent(quality=Quality.CAUTION, quality_reason="the data say little"))
+    assert shown.startswith("Update(3 of observation 3, condensed, contact, caution, 125 nodes, up to ")
+    assert shown.endswith("'the data say little')")
+    values = repr(Field(MESH, bent()).at(REST))
+    assert values == "FieldValues(inside=bool[2000], displacement_mm=float64[2000, 3], sd_mm=float64[2000], known=float64[2000])"
+    assert "\n" not in repr(brainshift.Surface(REST, MODEL.tets)) and len(repr(brainshift.Surface(REST, MODEL.tets))) < 80

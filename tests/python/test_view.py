@@ -102,7 +102,7 @@ def test_the_value_at_the_cross_is_that_of_the_mesh(browser, surgery):
 
 def test_the_switches_change_the_picture_and_its_legend(browser):
     seen = set()
-    for name in ("u", "sd", "known", "none"):
+    for name in ("u", "sd", "known", "volume", "none"):
         browser.js(f"document.querySelector('input[value={name}]').click()")
         seen.add(browser.js("document.getElementById('axial').toDataURL()"))
         seen.add("legend " + browser.text("scale"))
@@ -110,7 +110,7 @@ def test_the_switches_change_the_picture_and_its_legend(browser):
     for switch in ("input[value=before]", "#arrows", "#tumour"):
         browser.js(f"document.querySelector('{switch}').click()")
         seen.add(browser.js("document.getElementById('axial').toDataURL()"))
-    assert len(seen) == 11
+    assert len(seen) == 13
     keep(browser, "arrows")
     for switch in ("input[value=u]", "input[value=now]", "#arrows", "#tumour"):
         browser.js(f"document.querySelector('{switch}').click()")
@@ -125,13 +125,41 @@ def test_keys_move_the_linked_slices(browser):
     browser.key("ArrowDown")
 
 
+def test_the_volume_change_at_the_cross_is_that_of_the_mesh(browser, surgery):
+    _, _, model, update = surgery
+    browser.js("document.querySelector('input[value=volume]').click()")
+    told = re.search(r" · volume ([+−])(\S+) %", browser.text("cursor"))
+    browser.js("document.querySelector('input[value=u]').click()")
+    now = np.array([model.tumour.vertices.mean(axis=0)])
+    field = brainshift.Field(brainshift.FieldMesh(model), update)
+    was = field.undeformed(now).points[0]
+    step = 2.0 * np.eye(3)
+    gradient = np.array([field.at([was + one]).displacement_mm[0] - field.at([was - one]).displacement_mm[0] for one in step]) / 4.0
+    change = 100.0 * (np.linalg.det(np.eye(3) + gradient.T) - 1.0)
+    assert abs(float(told[2]) * (-1 if told[1] == "−" else 1) - change) < 1.0
+
+
+def test_the_surface_turns_by_keys_and_is_not_black(browser):
+    lit = ("(() => { const c = document.getElementById('surface'), d = document.createElement('canvas'); d.width = d.height = 90;"
+           "const x = d.getContext('2d'); x.drawImage(c, 0, 0, 90, 90);"
+           "return x.getImageData(0, 0, 90, 90).data.filter((v, i) => i % 4 === 0 && v > 40).length; })()")
+    assert browser.js(lit) > 1500
+    before = browser.text("surface-from"), browser.js("document.getElementById('surface').toDataURL()")
+    assert before[0].startswith("3-D, from the ")
+    browser.js("document.getElementById('surface').focus()")
+    for _ in range(9):
+        browser.key("ArrowLeft")
+    assert browser.text("surface-from") != before[0]
+    assert browser.js("document.getElementById('surface').toDataURL()") != before[1]
+
+
 def test_everything_to_operate_has_a_name(browser):
     nodes = browser.call("Accessibility.getFullAXTree")["nodes"]
     for node in nodes:
         role = node.get("role", {}).get("value")
         if role in ("radio", "checkbox", "image", "img", "graphics-document"):
             assert node["name"]["value"], node
-    assert sum(node.get("role", {}).get("value") in ("radio", "checkbox") for node in nodes) == 9
+    assert sum(node.get("role", {}).get("value") in ("radio", "checkbox") for node in nodes) == 10
 
 
 @pytest.mark.parametrize("width, dark", [(1400, True), (800, False), (800, True)])

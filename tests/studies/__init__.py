@@ -10,5 +10,5 @@ What is wrong is told in one line. It needs numpy and matplotlib (docker/package
 
     rows.py      tables of comma-separated values        checks.py   checks, summary.json, records
     stats.py     percentiles, paired test, Pareto front  chart.py    one style for all charts
-    common.py    errors, options, files
+    common.py    errors, options, files                  clusters.py means over truths, then patients
 """

@@ -94,6 +94,12 @@ class Record:
                 raise WriteError(f"{self.folder / name}: cannot be written: {error.strerror}") from None
 
 
+def checks_of(rows, command=""):
+    """Of a table of checks."""
+    return [Check(f"{row['study']}: {row['name']}", row.number("value"), row["bound"],
+                  row["pass"] == "1" if row["pass"] else None, command) for row in rows]
+
+
 def _tables(checks, commit, command):
     verdicts = {"": "", "1": "yes"}
     lines = [f"Commit {commit}; `{command}`", "", "| study | figure | value | bound | holds | reference |",
@@ -109,8 +115,7 @@ def summarise(folder, commit, command):
     """Records -> tables.md and summary.json; prints them. True when every check holds."""
     rows = Table.read(folder / "checks.csv", CHECKS)
     left_out = [f"{row['study']}: {row['reason']}" for row in Table.read(folder / "left_out.csv", LEFT_OUT)]
-    checks = [Check(f"{row['study']}: {row['name']}", row.number("value"), row["bound"],
-                    row["pass"] == "1" if row["pass"] else None, command) for row in rows]
+    checks = checks_of(rows, command)
     print_checks(checks, left_out)
     write_file(folder / "summary.json", summary_json(checks, left_out))
     write_file(folder / "tables.md", _tables(rows, commit, command))

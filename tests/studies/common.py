@@ -1,7 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Errors with their exit status, options, and files that are written whole or not at all."""
 import argparse
+import gzip
 import os
+import zlib
 from pathlib import Path
 
 
@@ -45,8 +47,12 @@ def write_file(path, content):
 
 
 def read_text(path):
+    """Of a file, or of one that gzip compressed (.gz)."""
     try:
-        return Path(path).read_text(encoding="utf-8")
+        content = Path(path).read_bytes()
+        return (gzip.decompress(content) if str(path).endswith(".gz") else content).decode()
+    except (gzip.BadGzipFile, EOFError, zlib.error):
+        raise InputError(f"{path}: is not what gzip writes") from None
     except OSError as error:
         raise InputError(f"{path}: cannot be opened: {error.strerror}") from None
     except UnicodeDecodeError:

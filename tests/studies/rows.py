@@ -26,6 +26,9 @@ class Row:
             raise InputError(f"{self._file}: has no column {column}")
         return self._cells[place]
 
+    def has(self, column):
+        return column in self._places
+
     def number(self, column):
         cell = self[column]
         if not cell:
@@ -143,8 +146,12 @@ class Table:
 
 
 def study_rows(folder, columns):
-    """rows-*.csv of a study's folder below each other; at least one row."""
-    rows = Table.read_all(sorted(folder.glob("rows-*.csv")), columns)
+    """rows-*.csv of a study's folder, or rows-*.csv.gz, below each other; at least one row."""
+    paths = sorted([*folder.glob("rows-*.csv"), *folder.glob("rows-*.csv.gz")])
+    for path in paths:
+        if path.with_suffix("") in paths:
+            raise InputError(f"{path}: {path.stem} stands beside it; one of them must go")
+    rows = Table.read_all(paths, columns)
     if not len(rows):
         raise InputError(f"{folder}: no row in rows-*.csv")
     return rows

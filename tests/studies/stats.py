@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Percentiles, a paired t test and a Pareto front."""
+"""Percentiles, a paired t test, means over patients and a Pareto front."""
 import math
 from dataclasses import dataclass
 
@@ -85,6 +85,52 @@ def paired_t_test(a, b):
     freedom = test.pairs - 1
     test.p = incomplete_beta(0.5 * freedom, 0.5, freedom / (freedom + test.t ** 2))
     return test
+
+
+def t_quantile(freedom):
+    """The 0.975 quantile of Student's t: half the width of a 95 % interval, in standard errors."""
+    low, high = 0.0, 1e4
+    for _ in range(200):
+        middle = 0.5 * (low + high)
+        beyond = incomplete_beta(0.5 * freedom, 0.5, freedom / (freedom + middle ** 2))  # two-sided
+        low, high = (middle, high) if beyond > 0.05 else (low, middle)
+    return high
+
+
+@dataclass
+class Interval:
+    """A mean over independent patients, with its 95 % interval; NaN without a number, an interval without end
+    over one patient."""
+    mean: float = math.nan
+    low: float = -math.inf
+    high: float = math.inf
+    count: int = 0  # patients
+
+    def __str__(self):
+        if self.count < 2:
+            return f"{self.mean:.3g} of {self.count} patient{'' if self.count == 1 else 's'}"
+        return f"{self.mean:.3g}; {self.low:.3g} to {self.high:.3g} over {self.count} patients"
+
+
+def over_patients(values):
+    """values: one a patient. Values that are not finite are left out."""
+    values = np.asarray(values, dtype=float)
+    values = values[np.isfinite(values)]
+    if not len(values):
+        return Interval()
+    mean, std = mean_std(values)
+    half = t_quantile(len(values) - 1) * std / math.sqrt(len(values)) if len(values) > 1 else math.inf
+    return Interval(mean, mean - half, mean + half, len(values))
+
+
+def ratio_over_patients(ratios):
+    """The same of ratios: their geometric mean, by logarithms. A ratio that is not positive is left out."""
+    logs = over_patients([math.log(one) for one in ratios if one > 0.0])
+    return Interval(*map(_exp, (logs.mean, logs.low, logs.high)), logs.count)
+
+
+def _exp(x):
+    return math.inf if x > 700 else math.exp(x)
 
 
 def pareto_front(points):

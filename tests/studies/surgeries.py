@@ -1,19 +1,22 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """surgeries: many different simulated surgeries on some heads, bounds and pictures (docs/surgeries.md).
 
-Rows (rows-HEAD.csv) are those of the program `surgeries`, one per update. Means are over surgeries;
-unless stated, of the last update, which knows all sources. A refused update recovers nothing and
-covers nothing. Truths from outside the prior have bounds of their own (outside.py).
+Rows (rows-HEAD.csv) are those of the program `surgeries`, one per update. Means are over surgeries,
+then over patients (clusters.py), which their 95 % intervals are over too; unless stated, of the last
+update, which knows all sources. Ratios are of each patient's means. A refused update recovers nothing
+and covers nothing. Truths from outside the prior have bounds of their own (outside.py).
 """
 import math
 from functools import partial
 from pathlib import Path
 
-from . import chart, outside
+from . import chart, clusters, outside
 from .checks import Record
-from .common import study_parser, write_file
+from .clusters import or_zero
+from .common import study_parser
+from .outside import last_updates
 from .rows import Table, study_rows
-from .stats import over, percentile
+from .stats import over, percentile, ratio_over_patients
 from .summary import finish
 
 # Decrement of contact by descent, in posterior standard deviations, and depth of an open slave.
@@ -26,10 +29,9 @@ COLUMNS = ("head", "place", "seed", "scenario", "stage", "status", "nodes", "rec
            "removed_nodes")
 
 
-def last_updates(rows):
-    """The row of the last update of every surgery, in the order of the rows."""
-    return Table(rows.columns, [own[-1] for own in rows.groups("head", "place", "seed", "scenario").values()],
-                 rows.origin)
+def of_places(rows, column):
+    """{place: mean over its surgeries}, of one head."""
+    return {place: clusters.of_truths(own, lambda row: row.number(column)) for place, own in rows.groups("place").items()}
 
 
 def count(rows, column, holds):
@@ -66,12 +68,12 @@ class HeadChecks:
         self.verdicts()
 
     def tumour(self, scenario, last):
-        recovered = last.finite("recovered_pct").sum() / len(last)
-        error = last.mean("tumour_mm")
+        recovered = clusters.mean(last, or_zero("recovered_pct"))
+        error = clusters.mean(last, "tumour_mm").mean
         none_refused = len(last.finite("tumour_mm")) == len(last)
-        self.check(f"{scenario}: tumour recovered %", recovered,
-                   f">= 95 or error <= 0.15 mm (error {error:.3f} mm; aim 97)",
-                   recovered >= 95 or (none_refused and error <= 0.15))
+        self.check(f"{scenario}: tumour recovered %", recovered.mean,
+                   f">= 95 or error <= 0.15 mm ({recovered}; error {error:.3f} mm; aim 97)",
+                   recovered.mean >= 95 or (none_refused and error <= 0.15))
 
     def nowhere_worse(self, scenario, rows):
         worse = count(rows, "worse_nodes", lambda n: n > 0)
@@ -79,9 +81,9 @@ class HeadChecks:
                    f"0 of {len(rows)} (worst by {rows.largest('worst_excess_mm'):.2f} mm)", worse == 0)
 
     def coverage(self, scenario, last):
-        covered = last.finite("coverage_90").sum() / len(last)
-        self.check(f"{scenario}: coverage of the 90 % interval", covered, "0.80 to 0.97 (aim 0.85 to 0.95)",
-                   0.80 <= covered <= 0.97)
+        covered = clusters.mean(last, or_zero("coverage_90"))
+        self.check(f"{scenario}: coverage of the 90 % interval", covered.mean, f"0.80 to 0.97 ({covered}; aim 0.85 to 0.95)",
+                   0.80 <= covered.mean <= 0.97)
 
     def joint(self, scenario, rows, before):
         """All sources against the tumour alone: ours, or that of the estimate before where it is better."""
@@ -89,12 +91,12 @@ class HeadChecks:
         if not len(joint):
             return
         for column, what in (("craniotomy_mm", "by displacement"), ("craniotomy_closest_mm", "by closest point")):
-            alone = rows.where(stage="tumour").mean(column)
-            earlier = before.where(stage="tumour").mean(column)
-            alone = min(alone, earlier) if math.isfinite(earlier) else alone
-            ratio = over(joint.mean(column), alone)
-            self.check(f"{scenario}: craniotomy error {what} over that of the tumour alone", ratio,
-                       f"<= 0.5 ({alone:.3f} to {joint.mean(column):.3f} mm)", ratio <= 0.5)
+            joint_mm, alone_mm, earlier_mm = (
+                of_places(some, column) for some in (joint, rows.where(stage="tumour"), before.where(stage="tumour")))
+            alone_mm = {place: min(alone, earlier_mm.get(place, math.inf)) for place, alone in alone_mm.items()}
+            ratio = ratio_over_patients([over(joint_mm[place], alone) for place, alone in alone_mm.items() if place in joint_mm])
+            self.check(f"{scenario}: craniotomy error {what} over that of the tumour alone", ratio.mean,
+                       f"<= 0.5 ({ratio})", ratio.mean <= 0.5)
 
     def sag(self, scenario, last, before):
         """Where nothing swells, shrinks or is missing: no worse than before."""
@@ -107,9 +109,9 @@ class HeadChecks:
             self.record.left_out(self.head, f"{scenario}: sag against the estimate before: {why}")
             return
         for column, what in (("tumour_mm", "tumour"), ("field_mean_mm", "field")):
-            then, now = before.mean(column), last.mean(column)
-            self.check(f"{scenario}: {what} error over that of the estimate before", over(now, then),
-                       f"<= 1.15 (aim 1; {then:.3f} to {now:.3f} mm)", over(now, then) <= 1.15)
+            ratio = clusters.same_over(last, before, column)
+            self.check(f"{scenario}: {what} error over that of the estimate before", ratio.mean, f"<= 1.15 ({ratio}; aim 1)",
+                       ratio.mean <= 1.15)
 
     def single_coverage(self):
         covered = count(self.last, "coverage_90", lambda share: share >= 0.6)
@@ -119,8 +121,9 @@ class HeadChecks:
     def contradictions(self):
         rows = self.rows.where(lambda row: row.number("sources") > 1)
         if len(rows):
-            share = 100 * count(rows, "contradictions", lambda n: n > 0) / len(rows)
-            self.check("updates that call consistent sources contradictory %", share, "<= 1", share <= 1)
+            share = clusters.share(rows, lambda row: row.number("contradictions") > 0)
+            self.check("updates that call consistent sources contradictory %", 100 * share.mean,
+                       f"<= 1 ({share.low:.1%} to {share.high:.1%} over {share.count} patients)", share.mean <= 0.01)
 
     def inverted(self):
         """Whatever the quality says: it follows from the same count, so that no good field can have one."""
@@ -158,12 +161,14 @@ class HeadChecks:
         self.figure("updates that were refused", len(self.rows.where(status="refused")), "shown")
 
 
-def judge(rows, before, record):
+def judge(rows, before, record, fixed=Table()):
     own_truths, from_outside = outside.split(rows)
     for head, own in own_truths.groups("head").items():
         HeadChecks(own, before.where(head=head), record).run()
-    outside.sharpness(own_truths, last_updates, record)
-    outside.judge(from_outside, last_updates, record)
+    outside.judge(from_outside, record)
+    if len(from_outside):
+        outside.sharpness(own_truths, record)
+        outside.compare(rows, before, fixed, record)
 
 
 def draw(rows, folder):
@@ -191,15 +196,16 @@ def main(arguments):
                           "make surgeries", "Surgeries")
     parser.add_argument("--before", type=Path, nargs="*", default=[],
                         help="tables of an earlier estimate on the same surgeries")
+    parser.add_argument("--fixed", type=Path, nargs="*", default=[], help="tables of the same with prior.scales: fixed")
     options = parser.parse_args(arguments)
     rows = study_rows(options.dir, COLUMNS)
     before = Table.read_all(options.before)
     before = before if before.columns else Table(rows.columns)
     record = Record(options.dir)
-    judge(rows, before, record)
+    judge(rows, before, record, Table.read_all(options.fixed))
     record.save()
     draw(rows, options.dir)
     from_outside = outside.split(rows)[1]
     if len(from_outside):
-        write_file(options.dir / "outside.md", outside.table_text(from_outside))
+        outside.publish(from_outside, record, options.dir, options.commit)
     return finish(options)

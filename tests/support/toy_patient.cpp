@@ -54,7 +54,8 @@ CaseConfig toy_config() {
   config.prior.medium_density_sd_n_m3 = config.prior.coarse_density_sd_n_m3 = 0.0;
   config.prior.tumour_volume_strain_sd = config.prior.brain_volume_strain_sd = 0.0;
   config.prior.resection_weight_sd = config.prior.resection_stress_sd_pa = 0.0;
-  config.prior.opening_pressure_sd_pa = 0.0;
+  config.prior.opening_pressure_sd_pa = config.prior.tract_pressure_sd_pa = 0.0;
+  config.prior.ventricle_volume_strain_sd = 0.0;
   return config;
 }
 

@@ -56,6 +56,9 @@ RegionScore score_region(const Points& displacement, const Points& truth, const 
     variances += sd[node] * sd[node];
     for (const double each : error) {
       score.coverage_90 += std::abs(each) <= kNormalQuantile95 * sd[node] ? 1.0 : 0.0;
+      for (std::size_t i = 0; i < kIntervals.size(); ++i) {
+        score.coverage[i] += std::abs(each) <= kIntervals[i].radius * sd[node] ? 1.0 : 0.0;
+      }
       score.interval_mm += interval_score(each, sd[node]);
       score.crps_mm += gaussian_crps(each, sd[node]);
     }
@@ -67,6 +70,7 @@ RegionScore score_region(const Points& displacement, const Points& truth, const 
   score.rms_error_mm = std::sqrt(squares / (3.0 * count));
   score.rms_sd_mm = std::sqrt(variances / with_sd);
   score.coverage_90 /= 3.0 * with_sd;
+  for (double& share : score.coverage) share /= 3.0 * with_sd;
   score.interval_mm /= 3.0 * with_sd;
   score.crps_mm /= 3.0 * with_sd;
   return score;

@@ -7,6 +7,7 @@
 // sd about itself.
 #pragma once
 
+#include <array>
 #include <vector>
 
 #include "common/core/types.hpp"
@@ -14,6 +15,15 @@
 namespace brainshift::surgeries {
 
 inline constexpr double kNormalQuantile95 = 1.6448536269514722;  // half width of 90 %, in sd
+
+// Central intervals of a Gaussian: the share that each holds, and its half width in standard
+// deviations.
+struct Interval {
+  int percent;
+  double radius;
+};
+inline constexpr std::array<Interval, 6> kIntervals = {
+    {{50, 0.6745}, {68, 0.9945}, {80, 1.2816}, {90, 1.6449}, {95, 1.9600}, {99, 2.5758}}};
 
 // Interval score of the central 90 % interval (Winkler): its width, and 2 / 0.1 times what lies
 // beyond it:   2 q sd + 20 max(0, |error| - q sd)
@@ -31,10 +41,11 @@ double simultaneous_radius(long count);
 // Of some nodes. NaN where there are none, and without sd for all that needs it.
 struct RegionScore {
   int nodes = 0;
-  double error_mm = 0.0, none_mm = 0.0;        // mean |u - t| and |t|
-  double coverage_90 = 0.0;                    // of components
-  double interval_mm = 0.0, crps_mm = 0.0;     // means over components
-  double rms_sd_mm = 0.0, rms_error_mm = 0.0;  // of a component
+  double error_mm = 0.0, none_mm = 0.0;                 // mean |u - t| and |t|
+  double coverage_90 = 0.0;                             // of components
+  std::array<double, kIntervals.size()> coverage = {};  // the same for each of kIntervals
+  double interval_mm = 0.0, crps_mm = 0.0;              // means over components
+  double rms_sd_mm = 0.0, rms_error_mm = 0.0;           // of a component
 };
 // displacement, truth: 3 x n. sd: n, or none. nodes: indices.
 RegionScore score_region(const Points& displacement, const Points& truth, const VecX& sd,

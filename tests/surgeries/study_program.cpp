@@ -23,7 +23,8 @@ void find_external(fs::path& file, const fs::path& folder) {
 }  // namespace
 
 void add_study_options(CLI::App& app, StudyArguments& arguments) {
-  app.add_option("--first-seed", arguments.first_seed, "1001 for a trial")->capture_default_str();
+  app.add_option("--first-seed", arguments.first_seed, "trials begin at 1001")
+      ->capture_default_str();
   app.add_option("--thousand-nodes", arguments.thousand_nodes,
                  "size of the mesh; 18: the case's own edge length")
       ->capture_default_str()

@@ -9,10 +9,15 @@
 // begins at seed 1. While the estimate is being worked on, runs begin at 1001, so that nothing is
 // fitted to what is published.
 //
+// With --patients the places are the paper's patients instead, with their own tumour and opening
+// (config/cases/patient-N.yaml): rows of the head `patients`, place N.
+//
 // study_program.hpp says where the images of the case are looked for.
 #include <CLI/CLI.hpp>
+#include <algorithm>
 #include <cstdio>
 #include <filesystem>
+#include <functional>
 #include <string>
 #include <vector>
 
@@ -40,6 +45,8 @@ struct Arguments : StudyArguments {
   int seeds = 4;  // per place
   // Names; both lists in full when neither is given.
   std::vector<std::string> scenarios, kinds;
+  std::vector<int> patients;
+  bool fixed_strengths = false;
 };
 
 std::vector<std::string> every_kind() {
@@ -80,14 +87,13 @@ void tell(const SurgeryKey& key, const Row& last, double seconds) {
       text_of(last, "quality").c_str(), text_of(last, "status").c_str(), seconds);
 }
 
-Status run_place(const Arguments& arguments, const CaseConfig& config, const TetMesh& brain,
-                 const PlacePlan& plan, RowFile& rows) {
-  auto patient = client::vary_patient(config, brain, plan.patient_seed);
-  if (!patient) return tl::unexpected(patient.error());
-  const auto& tumour = std::get<TumourEllipsoid>(patient->tumour);
+Status run_place(const Arguments& arguments, CaseConfig patient, const PlacePlan& plan,
+                 RowFile& rows) {
+  if (arguments.fixed_strengths) patient.prior.estimate_scales = false;
+  const auto& tumour = std::get<TumourEllipsoid>(patient.tumour);
   const Stopwatch watch;
-  const bench::MeshWish wish{patient->case_id, arguments.thousand_nodes};
-  const auto head = bench::make_head(*patient, wish);
+  const bench::MeshWish wish{patient.case_id, arguments.thousand_nodes};
+  const auto head = bench::make_head(patient, wish);
   if (!head) return tl::unexpected(head.error());
   std::fprintf(stderr,
                "place %d: tumour at (%.0f %.0f %.0f) mm with half axes %.0f %.0f %.0f mm; %d "
@@ -98,31 +104,65 @@ Status run_place(const Arguments& arguments, const CaseConfig& config, const Tet
   return play_place(*head, plan, rows, tell);
 }
 
+// patient: makes the place's patient. Nothing to do where `rows` has all its surgeries.
+Status run_plan(const Arguments& arguments, const PlacePlan& plan,
+                const std::function<Result<CaseConfig>()>& patient, RowFile& rows) {
+  if (finished(plan, rows)) return {};
+  const auto config = patient();
+  const Status ok =
+      config ? run_place(arguments, *config, plan, rows) : Status(tl::unexpected(config.error()));
+  if (ok) return {};
+  return fail(ok.error().code,
+              plan.head + ", place " + std::to_string(plan.place) + ": " + ok.error().message);
+}
+
+PlacePlan plan_of(const Arguments& arguments, const std::string& head, int place) {
+  return {head,
+          place,
+          arguments.first_seed + static_cast<std::uint64_t>(place - 1),
+          seeds_of(arguments, place),
+          arguments.scenarios,
+          arguments.kinds};
+}
+
+Status run_places(const Arguments& arguments, RowFile& rows) {
+  const auto config = read_head(arguments.head);
+  if (!config) return tl::unexpected(config.error());
+  const auto brain = patient::build_patient(*config);
+  if (!brain) return tl::unexpected(brain.error());
+  for (int place = 1; place <= arguments.places; ++place) {
+    const PlacePlan plan = plan_of(arguments, config->case_id, place);
+    const auto varied = [&] {
+      return client::vary_patient(*config, brain->mesh, plan.patient_seed);
+    };
+    if (Status ok = run_plan(arguments, plan, varied, rows); !ok) return ok;
+  }
+  return {};
+}
+
+Status run_patients(const Arguments& arguments, RowFile& rows) {
+  for (const int patient : arguments.patients) {
+    const fs::path file =
+        arguments.head.parent_path() / ("patient-" + std::to_string(patient) + ".yaml");
+    const auto own = [&file] { return read_head(file); };
+    if (Status ok = run_plan(arguments, plan_of(arguments, "patients", patient), own, rows); !ok) {
+      return ok;
+    }
+  }
+  return {};
+}
+
 Status run(Arguments arguments) {
   if (arguments.scenarios.empty() && arguments.kinds.empty()) {
     arguments.scenarios = kScenarios;
     arguments.kinds = every_kind();
   }
-  const auto config = read_head(arguments.head);
-  if (!config) return tl::unexpected(config.error());
+  if (std::find(arguments.kinds.begin(), arguments.kinds.end(), "all") != arguments.kinds.end()) {
+    arguments.kinds = every_kind();
+  }
   auto rows = open_surgeries(arguments.out, arguments.resume);
   if (!rows) return tl::unexpected(rows.error());
-  const auto brain = patient::build_patient(*config);
-  if (!brain) return tl::unexpected(brain.error());
-  for (int place = 1; place <= arguments.places; ++place) {
-    PlacePlan plan{config->case_id,
-                   place,
-                   arguments.first_seed + static_cast<std::uint64_t>(place - 1),
-                   seeds_of(arguments, place),
-                   arguments.scenarios,
-                   arguments.kinds};
-    if (finished(plan, *rows)) continue;
-    if (Status ok = run_place(arguments, *config, brain->mesh, plan, *rows); !ok) {
-      return fail(ok.error().code,
-                  config->case_id + ", place " + std::to_string(place) + ": " + ok.error().message);
-    }
-  }
-  return {};
+  return arguments.patients.empty() ? run_places(arguments, *rows) : run_patients(arguments, *rows);
 }
 
 }  // namespace
@@ -139,16 +179,21 @@ int main(int argc, char** argv) {
   app.add_option("--seeds", arguments.seeds, "surgeries per place and scenario")
       ->capture_default_str()
       ->check(CLI::Range(1, 1000));
+  app.add_option("--patients", arguments.patients,
+                 "of the paper, instead of places: patient-N.yaml beside the head's case file")
+      ->check(CLI::Range(1, 5));
+  app.add_flag("--fixed-strengths", arguments.fixed_strengths,
+               "estimate with prior.scales: fixed, which the default is compared with");
   app.add_option("--scenarios", arguments.scenarios, "names, separated by spaces")
       ->check([](const std::string& name) {
         return brainshift::client::find_scenario(name) ? "" : name + " is unknown";
       });
   app.add_option("--kinds", arguments.kinds,
-                 "of truths from outside, separated by commas; with --scenarios or --kinds only "
-                 "what is named is played")
+                 "of truths from outside, separated by commas, or all; with --scenarios or --kinds "
+                 "only what is named is played")
       ->delimiter(',')
       ->check([](const std::string& name) {
-        return brainshift::outside::find_kind(name) ? "" : name + " is unknown";
+        return name == "all" || brainshift::outside::find_kind(name) ? "" : name + " is unknown";
       });
   brainshift::surgeries::add_study_options(app, arguments);
   return brainshift::surgeries::run_study(app, argc, argv,

@@ -2,6 +2,7 @@
 #include "tests/surgeries/surgery_rows.hpp"
 
 #include <algorithm>
+#include <cmath>
 #include <iterator>
 #include <limits>
 #include <span>
@@ -108,6 +109,22 @@ void score_intervals(const io::SurgeryTruth& truth, const std::vector<int>& node
   score.mean_sd_mm = has_sd ? sum / count : kNotScored;
 }
 
+void score_known(const io::SurgeryTruth& truth, const Estimate& estimate,
+                 const std::vector<int>& near, const std::vector<int>& far, UpdateScore& score) {
+  score.near_known = score.far_known = score.far_unmarked_mm = kNotScored;
+  const VecX& known = estimate.known;
+  if (known.size() != estimate.displacement.cols()) return;
+  if (!near.empty()) score.near_known = known(near).mean();
+  if (!far.empty()) score.far_known = known(far).mean();
+  double squares = 0.0, count = 0.0;
+  for (const int node : far) {
+    if (known[node] < kLeastKnown) continue;
+    squares += (estimate.displacement.col(node) - truth.displacement.col(node)).squaredNorm();
+    ++count;
+  }
+  score.far_unmarked_mm = count > 0.0 ? std::sqrt(squares / count) : 0.0;
+}
+
 void score_regions(const BrainModel& model, const io::SurgeryTruth& truth,
                    const std::vector<int>& nodes, const Estimate& estimate, int stage,
                    UpdateScore& score) {
@@ -131,6 +148,7 @@ void score_regions(const BrainModel& model, const io::SurgeryTruth& truth,
   score.near = of(near);
   score.far = of(far);
   score.cortex = of(cortex);
+  score_known(truth, estimate, near, far, score);
 }
 
 constexpr double kNotMeasured = std::numeric_limits<double>::quiet_NaN();
@@ -153,6 +171,10 @@ void add_region(const std::string& prefix, const RegionScore& score, Cells& cell
   cells.add(prefix + "crps_mm", score.crps_mm);
   cells.add(prefix + "rms_sd_mm", score.rms_sd_mm);
   cells.add(prefix + "rms_error_mm", score.rms_error_mm);
+  for (std::size_t i = 0; i < kIntervals.size(); ++i) {
+    if (kIntervals[i].percent == 90) continue;
+    cells.add(prefix + "coverage_" + std::to_string(kIntervals[i].percent), score.coverage[i]);
+  }
 }
 
 void add_key(const SurgeryFacts& facts, int stage, Cells& cells) {
@@ -198,6 +220,9 @@ void add_score(const UpdateScore& score, Cells& cells) {
   add_region("near_", score.near, cells);
   add_region("far_", score.far, cells);
   add_region("cortex_", score.cortex, cells);
+  cells.add("near_known", score.near_known);
+  cells.add("far_known", score.far_known);
+  cells.add("far_unmarked_mm", score.far_unmarked_mm);
 }
 
 std::string flag_names(const QualityFlags& flags) {

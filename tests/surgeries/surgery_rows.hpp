@@ -29,15 +29,6 @@ struct FieldErrors {
   double mean_mm = 0.0, p50_mm = 0.0, max_mm = 0.0;  // over all nodes
 };
 
-// Central intervals of a Gaussian: the share that each holds, and its half width in standard
-// deviations.
-struct Interval {
-  int percent;
-  double radius;
-};
-inline constexpr std::array<Interval, 6> kIntervals = {
-    {{50, 0.6745}, {68, 0.9945}, {80, 1.2816}, {90, 1.6449}, {95, 1.9600}, {99, 2.5758}}};
-
 struct UpdateScore {
   FieldErrors estimate;
   FieldErrors none;  // of no correction
@@ -54,6 +45,10 @@ struct UpdateScore {
   double mean_sd_mm = 0.0;                              // NaN without sd
   // All nodes; within kNear_mm of what was measured; the rest; those of the opening.
   RegionScore all, near, far, cortex;
+  // Means of Estimate::known; and over the far nodes that the update does not mark as unseen (known
+  // is kLeastKnown or more) the root mean square of the error's length: 0 where it marks them all.
+  // NaN without `known`.
+  double near_known = 0.0, far_known = 0.0, far_unmarked_mm = 0.0;
   // Like worse_nodes, but by more than a band that holds all nodes at once with 90 %
   // (simultaneous_radius).
   int beyond_band = 0;

@@ -217,7 +217,7 @@ _STATUSES = ("not_run", "iterating", "converged", "iteration_limit", "deadline")
 _METHODS = ("condensed", "paper", "paper-woodbury", "pcg")
 _BOUNDARIES = ("contact", "fixed")
 _PRIOR_PARTS = {"along_gravity", "across_gravity", "gravity_sides", "gravity_ends", "tumour_volume", "brain_volume",
-                "resection", "opening", "fine", "medium", "coarse", "far"}
+                "resection", "opening", "ventricles", "tract", "fine", "medium", "coarse", "far"}
 _MOST_HYPOTHESES = 4096
 _UNUSABLE_FROM = 17  # flags
 
@@ -353,7 +353,8 @@ def update(payload: bytes) -> v.Update:
         inverted_elements=checked.count(m.inverted_elements, "inverted_elements"),
         misfit_ratio=_optional(m, "misfit_ratio", checked.non_negative),
         data_outside_region=checked.count(m.data_outside_region, "data_outside_region"),
-        region_known=_optional(m, "region_known", checked.probability))
+        region_known=_optional(m, "region_known", checked.probability),
+        ventricle_change_mm3=_optional(m, "ventricle_change_mm3"))
     checked.require(nodes is None or m.part.base_sequence == 0 or value.usable, "part.base_sequence",
                     "is present although the update is not usable")
     return value

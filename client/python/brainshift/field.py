@@ -8,7 +8,7 @@ from typing import Optional
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from .values import Floats, Indices, Model, Update
+from .values import Brief, Floats, Indices, Model, Update
 
 _ROUNDING = 1e-9  # a weight so negative still counts as inside: no point falls between neighbours
 
@@ -20,8 +20,8 @@ def _rows(points: ArrayLike) -> Floats:
     return rows
 
 
-@dataclass(frozen=True)
-class FieldValues:
+@dataclass(frozen=True, repr=False)
+class FieldValues(Brief):
     """Of m points. Where `inside` is false the numbers are NaN: outside the mesh, or of a part (Update.nodes) that
     leaves out a node there."""
 
@@ -31,8 +31,8 @@ class FieldValues:
     known: Optional[Floats]  # (m,), 0 to 1; None when the update has none
 
 
-@dataclass(frozen=True)
-class Undeformed:
+@dataclass(frozen=True, repr=False)
+class Undeformed(Brief):
     points: Floats  # (m, 3), mm: where the deformed points were in the MRI; NaN outside the moved mesh
     field: FieldValues  # of these points
 

@@ -18,6 +18,20 @@ Singles = NDArray[np.float32]
 Indices = NDArray[np.int32]
 
 
+def _brief(value: Any) -> str:
+    if isinstance(value, np.ndarray):
+        return f"{value.dtype}{list(value.shape)}" if value.size > 4 else str(value.tolist())
+    return f"<{len(value)}>" if isinstance(value, (list, tuple)) and len(value) > 4 else repr(value)
+
+
+class Brief:
+    """Shown on one line: of an array its type and shape. For dataclasses with repr=False."""
+
+    def __repr__(self) -> str:
+        values = self.__dict__.items()
+        return f"{type(self).__name__}({', '.join(f'{name}={_brief(value)}' for name, value in values)})"
+
+
 @dataclass(frozen=True)
 class SessionKey:
     """Tells one session from every other, of this and of any daemon."""
@@ -79,13 +93,13 @@ class Session:
     model_bytes: int
 
 
-@dataclass(frozen=True)
-class Surface:
+@dataclass(frozen=True, repr=False)
+class Surface(Brief):
     vertices: Floats  # (n, 3), mm
     triangles: Indices  # (m, 3), counter-clockwise from outside
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Model:
     """The undeformed brain that displacements belong to."""
 
@@ -105,6 +119,10 @@ class Model:
     slave_plane_depth_mm: float
     tet_labels: Optional[Indices]  # (m,), 0: brain
 
+    def __repr__(self) -> str:
+        return (f"Model(case {self.case_id!r}, model {self.model_id}, {len(self.nodes)} nodes, {len(self.tets)} tetrahedra, "
+                f"{len(self.slaves)} slaves)")
+
     def to_meshio(self, update: Optional[Update] = None) -> Any:
         """The mesh as a meshio.Mesh, undeformed, with an update's field as point data.
 
@@ -121,16 +139,16 @@ class Model:
 # ---------- observations ----------
 
 
-@dataclass(frozen=True)
-class TumourBoundary:
+@dataclass(frozen=True, repr=False)
+class TumourBoundary(Brief):
     """Traced in tracked ultrasound. points: (n, 3), deformed, mm; sd_mm: per component."""
 
     points: ArrayLike
     sd_mm: float
 
 
-@dataclass(frozen=True)
-class CorticalSurface:
+@dataclass(frozen=True, repr=False)
+class CorticalSurface(Brief):
     """The exposed cortex. vertices: (n, 3), deformed, mm; triangles: (m, 3) or None."""
 
     vertices: ArrayLike
@@ -138,8 +156,8 @@ class CorticalSurface:
     triangles: Optional[ArrayLike] = None
 
 
-@dataclass(frozen=True)
-class LandmarkPairs:
+@dataclass(frozen=True, repr=False)
+class LandmarkPairs(Brief):
     """The same places before and after, (n, 3) each, mm; sd_mm: per component."""
 
     undeformed: ArrayLike
@@ -230,8 +248,8 @@ class MeanStd:
     std_mm: float
 
 
-@dataclass(frozen=True)
-class Contact:
+@dataclass(frozen=True, repr=False)
+class Contact(Brief):
     active: int  # slaves that carry a force
     penetrating: int  # slaves deeper than 0.01 mm
     max_penetration_mm: float
@@ -289,7 +307,7 @@ class PriorStrength:
     at_bound: bool
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Update:
     """The answer to an observation: a field, or why there is none."""
 
@@ -305,7 +323,7 @@ class Update:
     error_code: str  # set when status is "failed"
     displacement_mm: Optional[Singles]  # (n, 3)
     sd_mm: Optional[Singles]  # (n,)
-    known: Optional[Singles]  # (n,): share of the variance that the data took away; 0: a guess, 1: known
+    known: Optional[Singles]  # (n,): share of the standard deviation that the data took away; 0: a guess, 1: known
     nodes: Optional[Indices]  # of the mesh that the rows are of; None: all, in order
     mesh_nodes: Optional[int]  # nodes of the whole mesh, with `nodes`
     quality: Quality
@@ -324,7 +342,17 @@ class Update:
     misfit_ratio: Optional[float]  # 1: data as far off as their errors say
     data_outside_region: int
     region_known: Optional[float]  # mean of known over the region of surgery
+    ventricle_change_mm3: Optional[float]  # by how much the ventricles have grown; None: the model has none
     received_s: float = 0.0  # when this client received it, by currency.boot_time()
+
+    def __repr__(self) -> str:
+        about = [f"{self.sequence} of observation {self.observation_sequence}", self.method, self.boundary]
+        about.append(self.quality.name.lower() if self.final and not self.failed else self.status)
+        if self.displacement_mm is not None and len(self.displacement_mm):
+            about.append(f"{len(self.displacement_mm)} nodes, up to {np.linalg.norm(self.displacement_mm, axis=1).max():.2f} mm")
+        if why := self.quality_reason or (self.reason if self.failed else ""):
+            about.append(repr(why))
+        return f"Update({', '.join(about)})"
 
     @property
     def failed(self) -> bool:

@@ -53,6 +53,7 @@ def draw(model: brainshift.Model, update: brainshift.Update, file: str) -> None:
         axis.set_aspect("equal")
         axis.set_xlabel("R (mm, towards the patient's right)")
         figure.colorbar(dots, ax=axis, label=label, shrink=0.8)
+    axes[0].invert_xaxis()  # of both: the patient's right is on the left, as in all pictures of brainshift
     axes[0].set_ylabel("A (mm, towards the front)")
     axes[0].set_title("motion; arrows drawn 4x")
     axes[1].set_title("its standard deviation")

@@ -59,7 +59,7 @@ Result<FieldStream> FieldStream::build(const BrainModel& model, const StreamOpti
   rest->geometry = igtl::image_geometry(grid->dims, T_ras_voxel);
   rest->with_sd = options.with_sd;
   if (options.with_surfaces) {
-    const TriangleSurface cortex = geometry::boundary_surface(model.mesh);
+    const TriangleSurface cortex = geometry::surface_of(model.mesh.nodes, model.boundary_triangles);
     stream.cortex_ = anchors(locator, cortex.vertices);
     rest->cortex = resting(cortex, options.with_sd);
     if (model.tumour.num_triangles() > 0) {

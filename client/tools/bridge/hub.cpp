@@ -92,8 +92,29 @@ void Hub::offer(PicturePtr picture, Broadcast::Part part) {
   for (const auto& peer : peers_) peer->offer(broadcast);
 }
 
+void Hub::drop(std::unique_ptr<Peer>& peer, const std::string& why) {
+  tell_("client " + peer->name() + ": " + why);
+  replaced_of_gone_ += peer->replaced();
+  peer.reset();
+}
+
+void Hub::make_room() {
+  std::unique_ptr<Peer>* longest = nullptr;
+  auto since = Clock::now() - options_.unread;
+  for (auto& peer : peers_) {
+    const auto unread = peer->unread_since();
+    if (!unread || *unread > since) continue;
+    longest = &peer;
+    since = *unread;
+  }
+  if (longest == nullptr) return;
+  drop(*longest, "makes room: it does not read");
+  std::erase(peers_, nullptr);
+}
+
 void Hub::accept_peers() {
   while (auto socket = listener_.accept()) {
+    if (peers_.size() >= options_.max_peers) make_room();
     if (peers_.size() >= options_.max_peers) {
       tell_("client " + socket->peer_name() + ": turned away, there are " +
             std::to_string(peers_.size()) + " already");
@@ -180,10 +201,7 @@ void Hub::serve_peers(const std::vector<short>& events) {
       if (status) status = answered;
     }
     if (status && peer.wants_to_write()) status = peer.write();
-    if (status) continue;
-    tell_("client " + peer.name() + ": " + status.error().message);
-    replaced_of_gone_ += peer.replaced();
-    peers_[i].reset();
+    if (!status) drop(peers_[i], status.error().message);
   }
   std::erase(peers_, nullptr);
   replaced = replaced_of_gone_;

@@ -34,8 +34,10 @@ namespace brainshift::client {
 struct HubOptions {
   Address listen{"127.0.0.1", 18945};
   std::optional<Address> from;
-  // More clients are turned away: each may hold two pictures.
+  // Each may hold two pictures. A further client takes the place of the one that has not read what
+  // waits for it for the longest, `unread` at least; else it is turned away.
   std::size_t max_peers = 16;
+  std::chrono::milliseconds unread{5000};
   // What is kept of the messages of own clients, and of `from`.
   igtl::StreamLimits from_peers;
   igtl::StreamLimits from_upstream;
@@ -78,6 +80,8 @@ class Hub {
   void take_posts();
   void offer(PicturePtr picture, Broadcast::Part part);
   void accept_peers();
+  void make_room();
+  void drop(std::unique_ptr<Peer>& peer, const std::string& why);
   void serve_peers(const std::vector<short>& events);
   Status answer(Peer& peer, igtl::Message&& message);
   void say_goodbye();

@@ -67,6 +67,7 @@ Peer::Peer(Socket socket, igtl::StreamLimits limits)
     : socket_(std::move(socket)), name_(socket_.peer_name()), reader_(std::move(limits)) {}
 
 void Peer::offer(const BroadcastPtr& broadcast) {
+  if (!wants_to_write()) taken_ = std::chrono::steady_clock::now();
   if (!broadcast->whole()) {
     waiting_state_ = state_ = broadcast;
     return;
@@ -89,6 +90,11 @@ Status Peer::reply(const igtl::Envelope& envelope, const igtl::Content& content)
 
 bool Peer::wants_to_write() const {
   return !message_.empty() || !replies_.empty() || current_ || waiting_picture_ || waiting_state_;
+}
+
+std::optional<std::chrono::steady_clock::time_point> Peer::unread_since() const {
+  if (!wants_to_write()) return std::nullopt;
+  return taken_;
 }
 
 bool Peer::next_message() {
@@ -120,6 +126,7 @@ Status Peer::write() {
     const auto taken = socket_.write(message_);
     if (!taken) return tl::unexpected(taken.error());
     if (*taken == 0) return {};
+    taken_ = std::chrono::steady_clock::now();
     message_.remove_prefix(*taken);
     if (message_.empty()) {
       holder_ = nullptr;

@@ -49,6 +49,8 @@ class Peer {
   Status reply(const igtl::Envelope& envelope, const igtl::Content& content);
 
   bool wants_to_write() const;
+  // Since when it has taken nothing of what waits for it; nothing: it has all of it.
+  std::optional<std::chrono::steady_clock::time_point> unread_since() const;
   // Writes what the socket takes. kUnavailable: the peer is gone.
   Status write();
   // Reads what has come, and hands on each message that is understood. One that is not is told; an
@@ -85,6 +87,7 @@ class Peer {
   std::string reply_bytes_;
   BroadcastPtr holder_;
   std::string_view message_;
+  std::chrono::steady_clock::time_point taken_;  // when it took some, or something began to wait
 };
 
 // Upstream: the bridge as an OpenIGTLink client of PlusServer or 3D Slicer.

@@ -77,8 +77,11 @@ igtl::Metadata to_metadata(const ShownState& state) {
 }
 
 igtl::StatusReport to_status(const ShownState& state) {
-  if (state.usable()) return {};
   igtl::StatusReport report;
+  if (state.usable()) {
+    if (state.quality == "caution") report.text = "caution: " + state.flags;
+    return report;
+  }
   report.code = igtl::kStatusNotReady;
   report.error_name = "NotReady";
   report.text = state.reason.empty() ? "no current field" : state.reason;

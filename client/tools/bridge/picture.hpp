@@ -57,7 +57,7 @@ std::string flag_names(const Update& update);
 std::string to_json(const ShownState& state);
 // The same keys; a number as JSON writes it, an unknown age as "unknown".
 igtl::Metadata to_metadata(const ShownState& state);
-// Code 1 when usable(), else 13 with the reason.
+// Code 1 when usable(), with the flags of one to be used with caution; else 13 with the reason.
 igtl::StatusReport to_status(const ShownState& state);
 
 // What stays the same for as long as the model does.

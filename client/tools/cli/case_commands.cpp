@@ -24,7 +24,7 @@ Status run_preview(const PreviewArguments& arguments) {
   if (!summary) return tl::unexpected(summary.error());
   print_lines(summary->facts);
   for (const std::string& line : summary->doubts) std::printf("look again: %s\n", line.c_str());
-  for (const auto& file : summary->files) std::printf("wrote %s\n", file.c_str());
+  for (const auto& file : summary->files) print_wrote(file);
   if (summary->problems.empty()) return {};
   return invalid(arguments.case_file.string() +
                  ": cannot be prepared: " + summary->problems.front());
@@ -59,7 +59,9 @@ Status run_simulate(const SimulateArguments& arguments) {
   if (Status ok = required(known, "--scenario or --truth"); !ok) return ok;
   if (Status ok = required(!arguments.options.out.empty(), "--out"); !ok) return ok;
   if (Status ok = io::check_output_file("--out", arguments.options.out); !ok) return ok;
-  return simulate(arguments.options, terminal_progress());
+  return simulate(arguments.options, terminal_progress()).map([&] {
+    print_wrote(arguments.options.out);
+  });
 }
 
 }  // namespace

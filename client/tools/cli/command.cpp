@@ -35,6 +35,10 @@ void print_lines(const std::vector<std::string>& lines) {
   for (const std::string& line : lines) print_line(one_line(line, '?'));
 }
 
+void print_wrote(const std::filesystem::path& path, const std::string& more) {
+  print_line("wrote " + one_line(path.string() + more, '?'));
+}
+
 void print_error(std::string_view sentence) {
   std::fprintf(stderr, "brainshift: %s\n", one_line(sentence).c_str());
 }

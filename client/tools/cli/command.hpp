@@ -35,6 +35,7 @@ void add_stereo(CLI::App& app, Status& status);
 void add_journal(CLI::App& app, Status& status);
 void add_export(CLI::App& app, Status& status);
 void add_watch(CLI::App& app, Status& status);
+void add_advise(CLI::App& app, Status& status);
 void add_view(CLI::App& app, Status& status);
 void add_status(CLI::App& app, Status& status);
 void add_top(CLI::App& app, Status& status);
@@ -65,6 +66,8 @@ auto add_required(App& command, const char* name, Value& value, const char* help
 // Prints a line to stdout, and lets nothing wait in a buffer.
 void print_line(const std::string& line);
 void print_lines(const std::vector<std::string>& lines);
+// The last line of a command that wrote a file: "wrote PATH", and what else it says of it.
+void print_wrote(const std::filesystem::path& path, const std::string& more = "");
 // Prints "brainshift: <sentence>" to stderr, line breaks replaced by spaces.
 void print_error(std::string_view sentence);
 

@@ -35,8 +35,11 @@ Status check_landmarks_alone(const ImportArguments& arguments) {
 
 // Prints what was made, if it was.
 template <typename Report>
-Status print_report(const Result<Report>& report) {
-  return report.map([](const Report& made) { print_lines(report_lines(made)); });
+Status print_report(const Result<Report>& report, const std::filesystem::path& out) {
+  return report.map([&](const Report& made) {
+    print_lines(report_lines(made));
+    if (!out.empty()) print_wrote(out);
+  });
 }
 
 Status run_landmarks(const ImportArguments& arguments) {
@@ -44,7 +47,8 @@ Status run_landmarks(const ImportArguments& arguments) {
   const ImportOptions& given = arguments.options;
   return print_report(import_landmarks({arguments.landmarks, arguments.landmarks_moved,
                                         given.case_file, given.model, given.out, given.sd_mm},
-                                       terminal_progress()));
+                                       terminal_progress()),
+                      given.out);
 }
 
 Status run_import(const ImportArguments& arguments) {
@@ -54,7 +58,7 @@ Status run_import(const ImportArguments& arguments) {
   }
   if (!arguments.landmarks.empty()) return run_landmarks(arguments);
   if (!arguments.landmarks_moved.empty()) return invalid("--landmarks-moved needs --landmarks");
-  return print_report(import_recording(options, terminal_progress()));
+  return print_report(import_recording(options, terminal_progress()), options.out);
 }
 
 // What the arguments say, before they are options of register_patient.
@@ -71,7 +75,7 @@ Status run_register(const RegisterArguments& arguments) {
   if (!options.out.empty()) {  // register_patient names what is missing
     if (Status ok = io::check_output_file("--out", options.out); !ok) return ok;
   }
-  return print_report(register_patient(options, terminal_progress()));
+  return print_report(register_patient(options, terminal_progress()), options.out);
 }
 
 void add_inputs(CLI::App& command, RegisterArguments& arguments) {

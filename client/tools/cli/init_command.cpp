@@ -13,7 +13,7 @@ Status run_init(const InitOptions& options) {
   const auto summary = write_first_case(options);
   if (!summary) return tl::unexpected(summary.error());
   print_lines(summary->guesses);
-  for (const auto& file : summary->files) std::printf("wrote %s\n", file.c_str());
+  for (const auto& file : summary->files) print_wrote(file);
   std::printf("look at it: brainshift preview --case %s --out preview\n", options.out.c_str());
   return {};
 }

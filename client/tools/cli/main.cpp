@@ -1,13 +1,16 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
+#include <fmt/format.h>
 #include <sys/stat.h>
 
 #include <CLI/CLI.hpp>
 #include <algorithm>
 #include <exception>
 #include <string>
+#include <vector>
 
 #include "client/tools/cli/command.hpp"
 #include "common/core/exit_status.hpp"
+#include "common/io/files/command_words.hpp"
 #include "common/linalg/openblas.hpp"
 
 int main(int argc, char** argv) {
@@ -19,7 +22,8 @@ int main(int argc, char** argv) {
       "surgeries with known truth, "
       "replay recorded ones to brainshiftd, and report how well the deformation was recovered; "
       "solve single forward problems on any mesh; import recordings of tracked ultrasound and "
-      "landmarks; register patients by fiducials; check, export and mend journals; watch a "
+      "landmarks; register patients by fiducials; check, export and mend journals; say what to "
+      "measure next; watch a "
       "running brainshiftd; make keys.\n"
       "Research software for simulation, replay and laboratory use; no medical device.",
       "brainshift"};
@@ -41,8 +45,8 @@ int main(int argc, char** argv) {
        {client::add_init, client::add_preview, client::add_simulate, client::add_replay,
         client::add_report, client::add_solve, client::add_import, client::add_register,
         client::add_stereo, client::add_journal, client::add_export, client::add_watch,
-        client::add_view, client::add_bridge, client::add_status, client::add_top,
-        client::add_keys}) {
+        client::add_view, client::add_advise, client::add_bridge, client::add_status,
+        client::add_top, client::add_keys}) {
     add(app, status);
   }
 
@@ -50,11 +54,16 @@ int main(int argc, char** argv) {
   const auto commands = app.get_subcommands(nullptr);
   const auto named = [&](const CLI::App* command) { return command->check_name(argv[1]); };
   if (argc > 1 && argv[1][0] != '-' && std::none_of(commands.begin(), commands.end(), named)) {
-    client::print_error(
-        "unknown command \"" + std::string(argv[1]) +
-        "\": must be init, preview, simulate, replay, report, solve, import, register, "
-        "stereo, journal, export, "
-        "watch, view, bridge, status, top or keys (see brainshift --help)");
+    const std::string typed = argv[1];
+    if (typed == "prepare" || typed == "serve" || typed == "health")
+      io::become("brainshiftd", argv);
+    std::vector<std::string> names;
+    for (const CLI::App* command : commands) names.push_back(command->get_name());
+    const std::string meant = io::nearest_word(typed, names);
+    client::print_error("unknown command \"" + typed + "\"" +
+                        (meant.empty() ? "" : ", did you mean " + meant + "?") +
+                        ": must be one of " + fmt::format("{}", fmt::join(names, ", ")) +
+                        " (see brainshift --help), or of brainshiftd's: prepare, serve, health");
     return kExitBadInput;
   }
   try {

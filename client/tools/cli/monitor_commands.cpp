@@ -173,11 +173,11 @@ void add_watch(CLI::App& app, Status& status) {
   brainshift watch --endpoint tcp://127.0.0.1:5555
   brainshift watch --region tumour:40mm --tolerance 0.1mm
   brainshift watch --region -30,12,44:50mm --decimate 10mm --no-sd --count 20 --json
-A line: the update's number, the age of its data, the nodes that the viewer now has of the
-mesh (those that travelled, and all bytes of the message), the mean motion of the tumour's
-nodes among them, method, boundary condition, the verdict on the field, and whether it may be
-shown as current; RECORDED when a recording is played. Between updates a line tells when that
-changes, e.g. to aged when all sources are silent, to stale when the daemon is.)");
+A line of 80 columns: the update's number, the age of its data, the mean motion of the tumour's
+nodes and its standard deviation, the verdict on the field, the boundary condition, and whether
+it may be shown as current; RECORDED when a recording is played. Indented lines below it give
+reasons and, for a viewer that chose a part, what travelled. Between updates a line tells when
+that changes, e.g. to aged when all sources are silent, to stale when the daemon is.)");
   command->callback([arguments, &status] { status = run_watch(*arguments); });
 }
 

@@ -66,8 +66,10 @@ Status run_replay(ReplayArguments arguments) {
   options.on_note = [](const std::string& sentence) {
     std::printf("note: %s\n", sentence.c_str());
   };
-  return replay(options, terminal_progress(),
-                [](const RunReport& run) { print_line(summary_line(run)); });
+  const auto tell = [](const RunReport& run) { print_line(summary_line(run)); };
+  return replay(options, terminal_progress(), tell).map([&] {
+    print_wrote(options.report, ", and the fields beside it; brainshift report makes a page of it");
+  });
 }
 
 }  // namespace
@@ -141,12 +143,16 @@ void add_report(CLI::App& app, Status& status) {
   add_required(*command, "reports", options->reports, "report.json files of `brainshift replay`");
   add_required(*command, "--out", options->out, "folder to fill; made if it is missing");
   command->footer(
-      "Writes report.json (all runs), report.html and the pictures as PNG. Example:\n"
+      "Writes report.json (all runs), report.html (at most 5 MB) and the pictures as PNG and SVG. "
+      "Example:\n"
       "  brainshift report paper.json paper-icp.json --out report");
   command->callback([options, &status] {
-    status = io::check_output_folder("--out", options->out).and_then([&] {
-      return write_report(*options, terminal_progress());
-    });
+    status =
+        io::check_output_folder("--out", options->out)
+            .and_then([&] { return write_report(*options, terminal_progress()); })
+            .map([&] {
+              print_wrote(options->out / "report.html", ", report.json and pictures beside it");
+            });
   });
 }
 

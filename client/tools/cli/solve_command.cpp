@@ -241,6 +241,7 @@ Status run_solve(const SolveArguments& arguments) {
     std::printf("%s\n", summary(*spec, *solution, *values).dump(2).c_str());
   } else {
     print_solution(*spec, *solution, *values);
+    print_wrote(arguments.out);
   }
   for (const std::string& warning : solution->warnings) {
     std::fprintf(stderr, "brainshift: warning: %s\n", warning.c_str());

@@ -43,6 +43,7 @@ Status run_reconstruct(const ReconstructJob& job) {
               made.median_sd_mm);
   std::printf("left out: %d pixels in small parts, %d outlying points\n",
               made.pixels_in_small_parts, made.outlier_points);
+  print_wrote(job.out);
   return {};
 }
 
@@ -58,6 +59,7 @@ Status run_observe(const ObserveJob& job) {
       checked.surface.num_vertices(), checked.surface.num_triangles(), checked.extent_mm,
       checked.distance_mm);
   for (const std::string& note : checked.notes) std::printf("note: %s\n", note.c_str());
+  print_wrote(job.out);
   return {};
 }
 

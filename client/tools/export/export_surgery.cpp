@@ -210,10 +210,11 @@ class Writing {
       }
     }
     if (wants(ExportFormat::kKnown) && !samples.known.values.empty()) {
-      if (Status ok = scalar(samples.known, "known.nii.gz",
-                             "share of the variance that the data took away: 0 a guess from the "
-                             "prior alone, 1 known; 0 outside of the brain",
-                             "1");
+      if (Status ok =
+              scalar(samples.known, "known.nii.gz",
+                     "share of the standard deviation that the data took away: 0 a guess from the "
+                     "prior alone, 1 known; 0 outside of the brain",
+                     "1");
           !ok) {
         return ok;
       }

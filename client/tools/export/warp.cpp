@@ -109,7 +109,8 @@ DeformedSurface deformed_tumour(const BrainModel& model, const Points& u, const 
 
 DeformedSurface deformed_cortex(const BrainModel& model, const Points& u, const Uncertainty& of) {
   std::vector<NodeIndex> node_of_vertex;
-  TriangleSurface surface = geometry::boundary_surface(model.mesh, &node_of_vertex);
+  TriangleSurface surface =
+      geometry::surface_of(model.mesh.nodes, model.boundary_triangles, &node_of_vertex);
   const auto there = [&](const VecX& values) {
     return values.size() > 0 ? VecX(values(node_of_vertex)) : VecX();
   };

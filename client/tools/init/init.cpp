@@ -208,6 +208,7 @@ struct Draft {
   InitOptions options;
   fs::path mri, brain, tumour_file;
   TumourChoice tumour;
+  std::optional<VoxelImage> series;    // of a DICOM MRI
   std::optional<VoxelImage> segments;  // of a DICOM segmentation
   std::string about_mri, about_brain, about_tumour, about_opening, about_stem, about_gravity;
   double opening_mm = 0.0;
@@ -243,7 +244,13 @@ std::string case_text(const Draft& draft) {
   text += "  centre_mm: " + list_text(draft.stem, 1) + "\n";
   text += fmt::format("  radius_mm: {:.0f}\n", kStemRadius_mm);
   text += "\ngravity:\n" + comment(draft.about_gravity, 2);
-  return text + "  direction: " + list_text(draft.gravity, 4) + "\n";
+  text += "  direction: " + list_text(draft.gravity, 4) + "\n";
+  if (draft.options.labels.empty()) return text;
+  text += "\n" + comment(
+                     "Tissues, falx, tentorium and ventricles from the label map "
+                     "(docs/your-patient.md): without the comment signs the model has them.",
+                     0);
+  return text + "# anatomy:\n#   labels: " + file_text(draft.options.labels) + "\n";
 }
 
 // ---- what is guessed ----
@@ -330,6 +337,106 @@ Status guess_tumour(Draft& draft, const VoxelImage& brain) {
   return {};
 }
 
+// ---- the steps of a first case ----
+
+// A series is turned into a volume beside the case; a volume is used where it lies.
+Status take_mri(Draft& draft) {
+  const InitOptions& options = draft.options;
+  draft.mri = options.mri;
+  if (fs::is_directory(options.mri)) {
+    auto read = io::read_dicom_series(options.mri);
+    if (!read) return tl::unexpected(read.error());
+    draft.mri = beside(options.out, "-mri.nii.gz");
+    draft.about_mri = about_series(*read);
+    draft.series = std::move(read->image);
+    return {};
+  }
+  if (io::lower_extension(options.mri) == ".dcm") {
+    return invalid("--mri: " + options.mri.string() +
+                   ": is one image of a DICOM series: give the folder that holds the series");
+  }
+  if (const auto mri = io::read_volume(options.mri); !mri) return tl::unexpected(mri.error());
+  return {};
+}
+
+Result<VoxelImage> given_brain(Draft& draft) {
+  const std::string file = draft.options.brain.string();
+  const auto given = io::read_volume(draft.options.brain);
+  if (!given) return tl::unexpected(given.error());
+  anatomy::Notes notes;
+  auto mask = anatomy::brain_mask(*given, file, &notes);
+  if (!mask) return mask;
+  draft.about_brain = fmt::format("Given; {:.0f} cc.", centre_of_mask(*mask).cc);
+  for (const std::string& note : notes) {
+    draft.about_brain += " " + note.substr(file.size() + 2) + ".";
+  }
+  return mask;
+}
+
+Result<VoxelImage> guessed_brain(Draft& draft, const VoxelImage& labels) {
+  const InitOptions& options = draft.options;
+  auto mask = anatomy::brain_from_labels(labels);
+  if (!mask) return io::file_error(options.labels, mask.error());
+  draft.brain = beside(options.out, "-brain.nii.gz");
+  draft.about_brain = fmt::format(
+      "GUESS: cerebrum, cerebellum, brainstem and ventricles of {}, with sulci closed; "
+      "{:.0f} cc.",
+      options.labels.filename().string(), centre_of_mask(*mask).cc);
+  return mask;
+}
+
+void guess_stem(Draft& draft, const VoxelImage& brain, const std::optional<VoxelImage>& labels) {
+  const auto stem = labels ? stem_from_labels(*labels) : std::nullopt;
+  draft.stem = stem ? *stem : lowest_part(brain, kStemHalfWidth_mm);
+  draft.about_stem =
+      stem ? fmt::format("GUESS: the lowest {:g} mm of the brainstem in {}.", kLowest_mm,
+                         draft.options.labels.filename().string())
+           : fmt::format(
+                 "GUESS: the lowest {:g} mm of the brain within {:g} mm of its middle; "
+                 "tonsils of the cerebellum may lie there: move it to where the medulla "
+                 "leaves the skull.",
+                 kLowest_mm, kStemHalfWidth_mm);
+}
+
+Status take_gravity(Draft& draft) {
+  const auto gravity = gravity_of_position(draft.options.position);
+  if (!gravity) return tl::unexpected(gravity.error());
+  draft.gravity = *gravity;
+  draft.about_gravity = fmt::format("From --position {}: where things fall, seen from the head.",
+                                    draft.options.position);
+  return {};
+}
+
+// The volumes that the case needs and that are not on the disk, then the case itself.
+Result<std::vector<fs::path>> write_files(const Draft& draft, const VoxelImage& brain,
+                                          const std::string& text) {
+  const InitOptions& options = draft.options;
+  std::vector<fs::path> files;
+  const auto write = [&](const fs::path& path, const VoxelImage& image, const char* note) {
+    files.push_back(path);
+    return io::write_nifti(path, {{image.dims, image.T_ras_voxel}, image.values, note});
+  };
+  Status ok;
+  if (draft.series) ok = write(draft.mri, *draft.series, "from DICOM");
+  if (ok && draft.segments) ok = write(draft.tumour_file, *draft.segments, "from DICOM SEG");
+  if (ok && options.brain.empty()) ok = write(draft.brain, brain, "brain mask");
+  if (ok) ok = io::write_file(options.out, text);
+  if (!ok) return tl::unexpected(ok.error());
+  files.push_back(options.out);
+  return files;
+}
+
+std::vector<std::string> guesses_of(const Draft& draft) {
+  std::vector<std::string> guesses;
+  if (draft.series) guesses.push_back("MRI: " + draft.about_mri);
+  for (std::string line : {"brain: " + draft.about_brain, "tumour: " + draft.about_tumour,
+                           "craniotomy: " + draft.about_opening, "brainstem: " + draft.about_stem,
+                           "gravity: " + draft.about_gravity}) {
+    guesses.push_back(std::move(line));
+  }
+  return guesses;
+}
+
 }  // namespace
 
 Vec3 lowest_part(const VoxelImage& mask, double half_width_mm) {
@@ -379,93 +486,28 @@ Result<InitSummary> write_first_case(const InitOptions& options) {
   if (Status ok = check_options(options); !ok) return tl::unexpected(ok.error());
   Draft draft;
   draft.options = options;
-  draft.mri = options.mri, draft.brain = options.brain, draft.tumour_file = options.tumour;
-  const auto gravity = gravity_of_position(options.position);
-  if (!gravity) return tl::unexpected(gravity.error());
-  draft.gravity = *gravity;
-  draft.about_gravity =
-      fmt::format("From --position {}: where things fall, seen from the head.", options.position);
-  InitSummary summary;
-  std::optional<VoxelImage> series;
-  if (fs::is_directory(options.mri)) {
-    auto read = io::read_dicom_series(options.mri);
-    if (!read) return tl::unexpected(read.error());
-    draft.mri = beside(options.out, "-mri.nii.gz");
-    draft.about_mri = about_series(*read);
-    series = std::move(read->image);
-  } else if (io::lower_extension(options.mri) == ".dcm") {
-    return invalid("--mri: " + options.mri.string() +
-                   ": is one image of a DICOM series: give the folder that holds the series");
-  } else if (const auto mri = io::read_volume(options.mri); !mri) {
-    return tl::unexpected(mri.error());
-  }
-
+  draft.brain = options.brain, draft.tumour_file = options.tumour;
+  if (Status ok = take_gravity(draft); !ok) return tl::unexpected(ok.error());
+  if (Status ok = take_mri(draft); !ok) return tl::unexpected(ok.error());
   std::optional<VoxelImage> labels;
   if (!options.labels.empty()) {
     auto map = read_labels(options.labels);
     if (!map) return tl::unexpected(map.error());
     labels = std::move(*map);
   }
-  VoxelImage brain;
-  if (!options.brain.empty()) {
-    const auto given = io::read_volume(options.brain);
-    if (!given) return tl::unexpected(given.error());
-    anatomy::Notes notes;
-    auto mask = anatomy::brain_mask(*given, options.brain.string(), &notes);
-    if (!mask) return tl::unexpected(mask.error());
-    brain = std::move(*mask);
-    draft.about_brain = fmt::format("Given; {:.0f} cc.", centre_of_mask(brain).cc);
-    for (const std::string& note : notes) {
-      draft.about_brain += " " + note.substr(options.brain.string().size() + 2) + ".";
-    }
-  } else {
-    auto mask = anatomy::brain_from_labels(*labels);
-    if (!mask) return io::file_error(options.labels, mask.error());
-    brain = std::move(*mask);
-    draft.brain = beside(options.out, "-brain.nii.gz");
-    draft.about_brain = fmt::format(
-        "GUESS: cerebrum, cerebellum, brainstem and ventricles of {}, with sulci closed; "
-        "{:.0f} cc.",
-        options.labels.filename().string(), centre_of_mask(brain).cc);
-  }
-  if (Status ok = guess_tumour(draft, brain); !ok) return tl::unexpected(ok.error());
-  const auto stem = labels ? stem_from_labels(*labels) : std::nullopt;
-  draft.stem = stem ? *stem : lowest_part(brain, kStemHalfWidth_mm);
-  draft.about_stem =
-      stem ? fmt::format("GUESS: the lowest {:g} mm of the brainstem in {}.", kLowest_mm,
-                         options.labels.filename().string())
-           : fmt::format(
-                 "GUESS: the lowest {:g} mm of the brain within {:g} mm of its middle; "
-                 "tonsils of the cerebellum may lie there: move it to where the medulla "
-                 "leaves the skull.",
-                 kLowest_mm, kStemHalfWidth_mm);
-
+  const auto brain = options.brain.empty() ? guessed_brain(draft, *labels) : given_brain(draft);
+  if (!brain) return tl::unexpected(brain.error());
+  if (Status ok = guess_tumour(draft, *brain); !ok) return tl::unexpected(ok.error());
+  guess_stem(draft, *brain, labels);
   const std::string text = case_text(draft);
   if (const auto read = io::parse_case_config(text, options.out); !read) {
     return tl::unexpected(read.error());
   }
-  const auto write = [&](const fs::path& path, const VoxelImage& image, const char* note) {
-    summary.files.push_back(path);
-    return io::write_nifti(path, {{image.dims, image.T_ras_voxel}, image.values, note});
-  };
-  if (series) {
-    if (Status ok = write(draft.mri, *series, "from DICOM"); !ok) return tl::unexpected(ok.error());
-  }
-  if (draft.segments) {
-    const Status ok = write(draft.tumour_file, *draft.segments, "from DICOM SEG");
-    if (!ok) return tl::unexpected(ok.error());
-  }
-  if (options.brain.empty()) {
-    if (Status ok = write(draft.brain, brain, "brain mask"); !ok) return tl::unexpected(ok.error());
-  }
-  if (Status ok = io::write_file(options.out, text); !ok) return tl::unexpected(ok.error());
-  summary.files.push_back(options.out);
-  if (series) summary.guesses.push_back("MRI: " + draft.about_mri);
-  for (std::string line : {"brain: " + draft.about_brain, "tumour: " + draft.about_tumour,
-                           "craniotomy: " + draft.about_opening, "brainstem: " + draft.about_stem,
-                           "gravity: " + draft.about_gravity}) {
-    summary.guesses.push_back(std::move(line));
-  }
+  auto files = write_files(draft, *brain, text);
+  if (!files) return tl::unexpected(files.error());
+  InitSummary summary;
+  summary.files = std::move(*files);
+  summary.guesses = guesses_of(draft);
   return summary;
 }
 

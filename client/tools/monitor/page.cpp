@@ -320,6 +320,7 @@ std::string summary(const Reports& reports) {
   const double seconds = seconds_between(reports);
   std::string text = fmt::format("{}, field {}", to_string(now.session.phase), age_text(now));
   if (const std::string kind = now.session.kind(); !kind.empty()) text += ", " + kind;
+  if (const std::string& id = now.session.session.model_id; !id.empty()) text += ", model " + id;
   if (seconds > 0.0) {
     text += fmt::format(", {:.1f} updates/s",
                         rate(final_updates(now), final_updates(*reports.before), seconds));

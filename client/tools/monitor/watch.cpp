@@ -10,7 +10,7 @@
 #include <utility>
 
 #include "client/lib/client.hpp"
-#include "common/geometry/closest_point.hpp"
+#include "common/core/text.hpp"
 
 namespace brainshift::client {
 namespace {
@@ -65,6 +65,7 @@ using std::chrono::milliseconds;
 // How long a line waits for the daemon to say how old its field is.
 constexpr milliseconds kForItsAge{20};
 constexpr milliseconds kBetweenLooks{250};
+constexpr std::size_t kColumns = 80;  // of a terminal
 
 nlohmann::json number_or_null(double value) {
   if (std::isfinite(value)) return value;
@@ -75,6 +76,7 @@ std::string json_line(const WatchedUpdate& update) {
   nlohmann::ordered_json line = {{"sequence", update.sequence},
                                  {"failure", update.failure},
                                  {"quality", update.quality},
+                                 {"quality_reason", update.doubt},
                                  {"answer_ms", update.answer_time.ms},
                                  {"late", update.answer_time.late()},
                                  {"age_s", number_or_null(update.status.age_s)},
@@ -87,9 +89,34 @@ std::string json_line(const WatchedUpdate& update) {
                                  {"mesh_nodes", update.mesh_nodes},
                                  {"received_nodes", update.received_nodes},
                                  {"received_bytes", update.received_bytes},
-                                 {"tumour_mm", nullptr}};
-  if (update.tumour_mm) line["tumour_mm"] = *update.tumour_mm;
+                                 {"tumour_mm", nullptr},
+                                 {"tumour_sd_mm", nullptr}};
+  if (update.tumour) line["tumour_mm"] = update.tumour->mm;
+  if (update.tumour && update.tumour->sd_mm) line["tumour_sd_mm"] = *update.tumour->sd_mm;
   return line.dump(-1, ' ', false, nlohmann::ordered_json::error_handler_t::replace);
+}
+
+// Further lines below a line, broken between words.
+std::string continued(const std::string& given) {
+  const std::string text = one_line(given, '?');
+  constexpr std::size_t kWidth = kColumns - 2;
+  std::string lines;
+  for (std::size_t from = 0; from < text.size();) {
+    std::size_t to = text.size();
+    if (to - from > kWidth) {
+      to = text.rfind(' ', from + kWidth);
+      if (to == std::string::npos || to <= from) to = from + kWidth;
+    }
+    lines += "\n  " + text.substr(from, to - from);
+    from = to < text.size() && text[to] == ' ' ? to + 1 : to;
+  }
+  return lines;
+}
+
+std::string motion_text(const std::optional<geometry::TumourMotion>& motion) {
+  if (!motion) return "no tumour node";
+  if (!motion->sd_mm) return fmt::format("tumour {:.2f} mm", motion->mm);
+  return fmt::format("tumour {:.2f} ± {:.2f} mm", motion->mm, *motion->sd_mm);
 }
 
 std::string status_text(const FieldStatus& status) {
@@ -118,7 +145,7 @@ class Watcher {
   Status run() {
     const auto model = client_.model();
     if (!model) return tl::unexpected(model.error());
-    tumour_ = tumour_nodes(*model);
+    tumour_ = geometry::tumour_nodes(*model);
     mesh_nodes_ = static_cast<int>(model->mesh.nodes.cols());
     if (Status status = client_.subscribe(1, options_.choice); !status) return status;
     while (options_.count == 0 || told_ < options_.count) {
@@ -193,16 +220,6 @@ Result<FieldChoice> parse_choice(const ChoiceText& text) {
   return validate(choice).map([&] { return choice; });
 }
 
-std::vector<NodeIndex> tumour_nodes(const BrainModel& model) {
-  std::vector<NodeIndex> nodes;
-  const auto tumour = geometry::ClosestPointIndex::build(model.tumour);
-  if (!tumour) return nodes;
-  for (NodeIndex node = 0; node < model.mesh.nodes.cols(); ++node) {
-    if (tumour->contains(model.mesh.nodes.col(node))) nodes.push_back(node);
-  }
-  return nodes;
-}
-
 WatchedUpdate watched(const UpdateMessage& message, const std::vector<NodeIndex>& tumour,
                       int mesh_nodes) {
   const Estimate& estimate = message.update.estimate;
@@ -218,37 +235,39 @@ WatchedUpdate watched(const UpdateMessage& message, const std::vector<NodeIndex>
     return update;
   }
   update.quality = to_string(estimate.quality.quality);
+  update.doubt = estimate.quality.reason;
   update.answer_time = message.update.answer_time;
   update.nodes = static_cast<int>(estimate.displacement.cols());
-  double sum_mm = 0.0;
-  int found = 0;
-  for (Eigen::Index column = 0; column < estimate.displacement.cols(); ++column) {
-    const auto& part = message.update.part;
-    const auto node =
-        part ? part->nodes[static_cast<std::size_t>(column)] : static_cast<NodeIndex>(column);
-    if (!std::binary_search(tumour.begin(), tumour.end(), node)) continue;
-    sum_mm += estimate.displacement.col(column).norm();
-    ++found;
-  }
-  if (found > 0) update.tumour_mm = sum_mm / found;
+  update.tumour = geometry::tumour_motion(message.update, tumour);
   return update;
 }
 
 std::string watch_line(const WatchedUpdate& update, bool json) {
   if (json) return json_line(update);
-  std::string line = fmt::format("update {}", update.sequence);
-  line += std::isfinite(update.status.age_s) ? fmt::format("  age {:.2f} s", update.status.age_s)
-                                             : "  age unknown";
+  std::string line = fmt::format("update {}  ", update.sequence);
+  line += std::isfinite(update.status.age_s) ? fmt::format("{:.2f} s old", update.status.age_s)
+                                             : "age unknown";
   if (!update.failure.empty()) {
-    return line + "  no field: " + update.failure + "  " + status_text(update.status);
+    line += fmt::format("  no field, {}", to_string(update.status.currency));
+    return line + continued(update.failure) + continued(update.status.reason);
   }
-  line += fmt::format("  {} of {} nodes ({} sent, {:.1f} kB)", update.nodes, update.mesh_nodes,
-                      update.received_nodes, 1e-3 * static_cast<double>(update.received_bytes));
-  line +=
-      update.tumour_mm ? fmt::format("  tumour {:.2f} mm", *update.tumour_mm) : "  no tumour node";
-  line += fmt::format("  {}, {}, {}", update.method, update.boundary, update.quality);
-  line += ", " + status_text(update.status);
-  if (update.answer_time.late()) line += "  LATE: " + sentence(update.answer_time);
+  line += "  " + motion_text(update.tumour);
+  line += fmt::format("  {}, {}", update.quality, update.boundary);
+  const std::string status = fmt::format("{}{}", to_string(update.status.currency),
+                                         update.status.recorded ? ", RECORDED" : "");
+  const bool fits = line.size() + 2 + status.size() <= kColumns;
+  line += fits ? ", " + status : continued(status);
+  if (!update.doubt.empty()) line += continued(update.quality + ": " + update.doubt);
+  if (!update.status.reason.empty()) {
+    line +=
+        continued(fmt::format("{}: {}", to_string(update.status.currency), update.status.reason));
+  }
+  if (update.answer_time.late()) line += continued("LATE: " + sentence(update.answer_time));
+  if (update.nodes < update.mesh_nodes || update.received_nodes < update.nodes) {
+    line += continued(fmt::format("{} of {} nodes ({} sent, {:.1f} kB)", update.nodes,
+                                  update.mesh_nodes, update.received_nodes,
+                                  1e-3 * static_cast<double>(update.received_bytes)));
+  }
   return line;
 }
 

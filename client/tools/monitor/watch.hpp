@@ -13,6 +13,7 @@
 #include "client/lib/client_keys.hpp"
 #include "client/lib/field_status.hpp"
 #include "common/core/error.hpp"
+#include "common/geometry/tumour_motion.hpp"
 #include "common/values/brain_model.hpp"
 #include "common/values/session_state.hpp"
 #include "common/wire/convert.hpp"
@@ -50,20 +51,22 @@ struct WatchedUpdate {
   std::uint64_t sequence = 0;
   std::string failure;  // why there is no field; empty with a field
   std::string quality;  // of the field
+  std::string doubt;    // why it is not good
   AnswerTime answer_time;
   int nodes = 0;           // that the viewer now has
   int mesh_nodes = 0;      // of the whole mesh
   int received_nodes = 0;  // that travelled
   std::size_t received_bytes = 0;
-  std::optional<double> tumour_mm;  // mean motion of the tumour's nodes among them
-  FieldStatus status;               // of the newest usable field, when the line was told
-  std::string method, boundary;     // of the update
+  std::optional<geometry::TumourMotion> tumour;  // of the tumour's nodes among them
+  FieldStatus status;            // of the newest usable field, when the line was told
+  std::string method, boundary;  // of the update
 };
 
-// Nodes inside the tumour, ascending; none without a tumour.
-std::vector<NodeIndex> tumour_nodes(const BrainModel& model);
 WatchedUpdate watched(const UpdateMessage& message, const std::vector<NodeIndex>& tumour,
                       int mesh_nodes);
+// Text: the update's number, age, motion of the tumour, verdict, boundary and currency in 80
+// columns; what more there is (reasons, a late answer, a part of the nodes) in indented lines of
+// as many.
 std::string watch_line(const WatchedUpdate& update, bool json);
 
 // Tells lines until `count` updates are told. kUnavailable and others: no daemon at the beginning,

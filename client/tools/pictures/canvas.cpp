@@ -50,6 +50,20 @@ Result<std::string> encode_png(const std::string& name, const cv::Mat& image) {
   return std::string(bytes.begin(), bytes.end());
 }
 
+Result<std::string> encode_webp(const std::string& name, const cv::Mat& image, int most_columns) {
+  constexpr int kQuality = 72;
+  cv::Mat narrow = image;
+  if (image.cols > most_columns) {
+    const double factor = static_cast<double>(most_columns) / image.cols;
+    cv::resize(image, narrow, {}, factor, factor, cv::INTER_AREA);
+  }
+  std::vector<unsigned char> bytes;
+  if (!cv::imencode(".webp", narrow, bytes, {cv::IMWRITE_WEBP_QUALITY, kQuality})) {
+    return fail(ErrorCode::kInternal, name + ": cannot be encoded as WebP");
+  }
+  return std::string(bytes.begin(), bytes.end());
+}
+
 TextStyle on_picture(double cap_px, bool bold) {
   return {cap_px, palette::kWhite, Align::kCentre, bold, true};
 }

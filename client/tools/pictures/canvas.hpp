@@ -15,7 +15,6 @@
 namespace brainshift::client {
 
 inline constexpr int kPixelRatio = 2;
-inline constexpr int kMarkerRadius = 10;  // of a chart's points
 
 // Okabe and Ito's palette: distinguishable under the common colour-vision deficiencies.
 namespace palette {
@@ -35,6 +34,10 @@ inline const cv::Scalar kPale(225, 225, 225);
 
 // An image as the bytes of a PNG file. kInternal; `name` is the file's, for the message.
 Result<std::string> encode_png(const std::string& name, const cv::Mat& image);
+
+// The same as a WebP file at most so many pixels wide, made narrower if it is not. It loses what
+// the eye does not see, and is a tenth as large.
+Result<std::string> encode_webp(const std::string& name, const cv::Mat& image, int most_columns);
 
 enum class Align { kLeft, kCentre, kRight };
 

@@ -1,246 +1,379 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "client/tools/pictures/chart.hpp"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cmath>
-#include <opencv2/imgproc.hpp>
+#include <map>
 #include <sstream>
 
 namespace brainshift::client {
 namespace {
 
-constexpr int kLineWidth = 4;
-constexpr double kLabelCap = 17.0;
+constexpr const char* kInk = "var(--ink,#1c1c1c)";
+constexpr const char* kSoft = "var(--soft,#5a5a5a)";
+constexpr const char* kRule = "var(--rule,#d4d4d4)";
+constexpr double kCharacter = 6.6;  // mean width at 13 px
 
-// A point of a series, where it is drawn. Points that cannot be shown have no place.
-struct Placed {
-  const ChartPoint* point = nullptr;
-  cv::Point2d at;
+std::string colour_of(const cv::Scalar& bgr) {
+  if (bgr == palette::kInk || bgr == palette::kBlack) return kInk;
+  return fmt::format("#{:02x}{:02x}{:02x}", static_cast<int>(bgr[2]), static_cast<int>(bgr[1]),
+                     static_cast<int>(bgr[0]));
+}
+
+bool can_show(double value, const Axis& axis) {
+  return std::isfinite(value) && (!axis.log || value > 0.0);
+}
+
+struct Range {
+  double min = 1.0, max = 0.0;
+  bool empty() const { return max < min; }
+  void include(double value) {
+    *this = empty() ? Range{value, value} : Range{std::min(min, value), std::max(max, value)};
+  }
 };
 
-// The series' points in runs that no missing point interrupts.
-std::vector<std::vector<Placed>> runs_of(const Series& series, const Frame& frame) {
-  std::vector<std::vector<Placed>> runs(1);
-  for (const ChartPoint& p : series.points) {
-    if (can_show(p.x, frame.x.axis) && can_show(p.y, frame.y.axis)) {
-      runs.back().push_back({&p, frame(p.x, p.y)});
-    } else if (!runs.back().empty()) {
-      runs.emplace_back();
-    }
+// With room for markers at its ends; an empty one becomes [0, 1], or [0.1, 10] on a logarithmic
+// axis.
+Range padded(const Range& data, const Axis& axis) {
+  if (data.empty()) return axis.log ? Range{0.1, 10.0} : Range{0.0, 1.0};
+  if (axis.log) {
+    const double pad = std::pow(std::max(data.max / data.min, 1.2), 0.07);
+    return {data.min / pad, data.max * pad};
   }
-  return runs;
+  const bool starts_at_zero = axis.from_zero && data.min >= 0.0;
+  const double pad = 0.06 * (data.max > data.min ? data.max - data.min : std::abs(data.max) + 1.0);
+  return {starts_at_zero ? 0.0 : data.min - pad, data.max + pad};
 }
 
-void draw_series(cv::Mat& image, const Series& series,
-                 const std::vector<std::vector<Placed>>& runs) {
-  for (const auto& run : runs) {
-    std::vector<cv::Point2d> line;
-    for (const Placed& p : run) line.push_back(p.at);
-    if (series.line) draw_polyline(image, line, {series.colour, kLineWidth, series.dash_px});
-    for (const cv::Point2d& at : line)
-      draw_marker(image, at, series.marker, series.colour, kMarkerRadius);
+struct Tick {
+  double value = 0.0;
+  std::string text;
+};
+
+std::vector<Tick> ticks_of(const Axis& axis, const Range& range) {
+  std::vector<double> values =
+      axis.log ? log_ticks(range.min, range.max) : nice_ticks(range.min, range.max, 5);
+  if (axis.counts) {
+    std::erase_if(values, [](double v) { return std::abs(v - std::round(v)) > 1e-9; });
   }
+  const double step = values.size() > 1 ? values[1] - values[0] : 1.0;
+  std::vector<Tick> ticks;
+  for (const double value : values) {
+    ticks.push_back({value, axis.log ? log_tick_label(value) : tick_label(value, step)});
+  }
+  return ticks;
 }
 
-// Writes labels beside their markers, each where it covers no other label and no marker.
-class Labels {
+struct LegendSample {
+  std::string name, colour;
+  bool line = false, bar = false;
+  double dash_px = 0.0;
+  Marker marker = Marker::kNone;
+};
+
+// The parts of a chart, in the order in which they are drawn.
+class Drawing {
  public:
-  Labels(cv::Mat& image, const cv::Rect& area) : image_(image), area_(area) {}
+  explicit Drawing(cv::Size size) : size_(size) {}
 
-  void keep_free(cv::Point2d marker) {
-    const cv::Point centre(static_cast<int>(marker.x), static_cast<int>(marker.y));
-    constexpr int kHalf = kMarkerRadius + 1;
-    taken_.emplace_back(centre - cv::Point(kHalf, kHalf), cv::Size(2 * kHalf, 2 * kHalf));
+  double left = 64.0, right = 0.0, top = 0.0, bottom = 0.0;  // the data area
+
+  void text(double x, double y, const std::string& words, const char* anchor,
+            const std::string& colour, const char* more = "") {
+    body_ +=
+        fmt::format("<text x=\"{:.1f}\" y=\"{:.1f}\" text-anchor=\"{}\" fill=\"{}\"{}>{}</text>\n",
+                    x, y, anchor, colour, more, escape_html(words));
+  }
+  void upright_text(double x, const std::string& words, const std::string& colour) {
+    const double y = 0.5 * (top + bottom);
+    text(x, y, words, "middle", colour,
+         fmt::format(" transform=\"rotate(-90 {:.1f} {:.1f})\"", x, y).c_str());
+  }
+  void line(const std::vector<cv::Point2d>& points, const std::string& colour, double width,
+            double dash_px = 0.0) {
+    body_ +=
+        fmt::format("<polyline fill=\"none\" stroke=\"{}\" stroke-width=\"{}\"", colour, width);
+    if (dash_px > 0.0) body_ += fmt::format(" stroke-dasharray=\"{}\"", dash_px);
+    body_ += " points=\"" + list(points) + "\"/>\n";
+  }
+  void area(const std::vector<cv::Point2d>& points, const std::string& colour) {
+    body_ += "<polygon fill=\"" + colour + "\" fill-opacity=\"0.25\" points=\"" + list(points) +
+             "\"/>\n";
+  }
+  void box(double x, double y, double width, double height, const std::string& colour,
+           const std::string& title = "") {
+    body_ += fmt::format(
+        "<rect x=\"{:.1f}\" y=\"{:.1f}\" width=\"{:.1f}\" height=\"{:.1f}\" fill=\"{}\"{}>", x, y,
+        width, height, colour, title.empty() ? "" : " class=\"hit\"");
+    if (!title.empty()) body_ += "<title>" + escape_html(title) + "</title>";
+    body_ += "</rect>\n";
+  }
+  void marker(cv::Point2d at, Marker marker, const std::string& colour) {
+    constexpr double kR = 4.0;
+    if (marker == Marker::kCircle) {
+      body_ += fmt::format("<circle cx=\"{:.1f}\" cy=\"{:.1f}\" r=\"{}\" fill=\"{}\"/>\n", at.x,
+                           at.y, kR, colour);
+    } else if (marker == Marker::kSquare) {
+      box(at.x - kR, at.y - kR, 2 * kR, 2 * kR, colour);
+    } else if (marker == Marker::kTriangle) {
+      body_ += "<polygon fill=\"" + colour + "\" points=\"" +
+               list({{at.x, at.y - 5.0}, {at.x - 5.0, at.y + 4.0}, {at.x + 5.0, at.y + 4.0}}) +
+               "\"/>\n";
+    }
   }
 
-  // At the first place of a list that is free and inside the data area; else nowhere.
-  void write(const std::string& text, cv::Point2d marker, const cv::Scalar& colour) {
-    const TextStyle style{.cap_px = kLabelCap, .colour = colour};
-    const int width = text_width(text, style);
-    const int height = static_cast<int>(kLabelCap) + 6;
-    const cv::Point p(static_cast<int>(marker.x), static_cast<int>(marker.y));
-    for (const int step : {0, 1, 2, 3}) {
-      const int up = step * height;
-      const cv::Point lower_left[] = {
-          {p.x + 16, p.y + 8 - up},         {p.x - 16 - width, p.y + 8 - up},
-          {p.x + 16, p.y + 8 + up},         {p.x - 16 - width, p.y + 8 + up},
-          {p.x - width / 2, p.y - 18 - up}, {p.x - width / 2, p.y + 34 + up}};
-      for (const cv::Point& place : lower_left) {
-        const cv::Rect box(place.x, place.y - height + 2, width, height);
-        if (!is_free(box)) continue;
-        draw_text(image_, place, text, style);
-        taken_.push_back(box);
-        return;
-      }
+  // Titles and, in rows below them, the legend; the data area is what remains.
+  void head(const std::string& title, const std::string& subtitle,
+            const std::vector<LegendSample>& samples, double right_margin, double bottom_margin) {
+    double y = 8.0;
+    if (!title.empty()) text(10.0, y += 14.0, title, "start", kInk, " font-weight=\"600\"");
+    if (!subtitle.empty()) text(10.0, y += 18.0, subtitle, "start", kSoft);
+    double x = 10.0;
+    if (!samples.empty()) y += 22.0;
+    for (const LegendSample& sample : samples) {
+      const double width = 34.0 + kCharacter * static_cast<double>(sample.name.size()) + 18.0;
+      if (x > 10.0 && x + width > size_.width) x = 10.0, y += 20.0;
+      if (sample.bar) box(x, y - 10.0, 26.0, 10.0, sample.colour);
+      if (sample.line)
+        line({{x, y - 5.0}, {x + 26.0, y - 5.0}}, sample.colour, 2.0, sample.dash_px);
+      marker({x + 13.0, y - 5.0}, sample.marker, sample.colour);
+      text(x + 34.0, y, sample.name, "start", kInk);
+      x += width;
     }
+    top = y + 14.0;
+    right = size_.width - right_margin;
+    bottom = size_.height - bottom_margin;
+    body_ += fmt::format(
+        "<rect x=\"{:.1f}\" y=\"{:.1f}\" width=\"{:.1f}\" height=\"{:.1f}\" "
+        "fill=\"none\" stroke=\"{}\"/>\n",
+        left, top, right - left, bottom - top, kRule);
+  }
+
+  double x_at(double value, const Axis& axis, const Range& range) const {
+    return left + axis_fraction(value, range.min, range.max, axis.log) * (right - left);
+  }
+  double y_at(double value, const Axis& axis, const Range& range) const {
+    return bottom - axis_fraction(value, range.min, range.max, axis.log) * (bottom - top);
+  }
+
+  void x_axis(const Axis& axis, const Range& range) {
+    for (const Tick& tick : ticks_of(axis, range)) {
+      const double x = x_at(tick.value, axis, range);
+      line({{x, top}, {x, bottom + 4.0}}, kRule, 1.0);
+      text(x, bottom + 18.0, tick.text, "middle", kSoft);
+    }
+    text(0.5 * (left + right), bottom + 38.0, axis.label, "middle", kInk);
+  }
+  void y_axis(const Axis& axis, const Range& range) {
+    for (const Tick& tick : ticks_of(axis, range)) {
+      const double y = y_at(tick.value, axis, range);
+      line({{left, y}, {right, y}}, kRule, 1.0);
+      text(left - 7.0, y + 4.0, tick.text, "end", kSoft);
+    }
+    upright_text(16.0, axis.label, kInk);
+  }
+  void right_axis(const Axis& axis, const Range& range, const std::string& colour) {
+    for (const Tick& tick : ticks_of(axis, range)) {
+      text(right + 7.0, y_at(tick.value, axis, range) + 4.0, tick.text, "start", colour);
+    }
+    upright_text(size_.width - 10.0, axis.label, colour);
+  }
+
+  std::string finish(const std::string& name) const {
+    return fmt::format(
+               "<svg xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 {} {}\" width=\"{}\" "
+               "height=\"{}\" role=\"img\" aria-label=\"{}\" font-family=\"system-ui,sans-serif\" "
+               "font-size=\"13\">\n<rect width=\"100%\" height=\"100%\" "
+               "fill=\"var(--ground,#ffffff)\"/>\n",
+               size_.width, size_.height, size_.width, size_.height, escape_html(name)) +
+           body_ + "</svg>\n";
   }
 
  private:
-  bool is_free(const cv::Rect& box) const {
-    return (box & area_) == box &&
-           std::none_of(taken_.begin(), taken_.end(),
-                        [&](const cv::Rect& other) { return (box & other).area() > 0; });
+  static std::string list(const std::vector<cv::Point2d>& points) {
+    std::string text;
+    for (const cv::Point2d& p : points) text += fmt::format("{:.1f},{:.1f} ", p.x, p.y);
+    return text;
   }
 
-  cv::Mat& image_;
-  cv::Rect area_;
-  std::vector<cv::Rect> taken_;
+  cv::Size size_;
+  std::string body_;
 };
 
-struct Ranges {
-  Range x, left, right;
-};
+std::string value_text(double value) { return fmt::format("{:.3g}", value); }
 
-Ranges ranges_of(const ChartSpec& spec) {
-  Ranges ranges;
-  for (const Series& series : spec.series) {
-    const Axis& vertical = series.right_axis ? spec.right : spec.y;
-    for (const ChartPoint& p : series.points) {
-      if (!can_show(p.x, spec.x) || !can_show(p.y, vertical)) continue;
-      ranges.x.include(p.x);
-      (series.right_axis ? ranges.right : ranges.left).include(p.y);
+// Labels beside the markers, each at the first of some places where it covers no other.
+void write_labels(Drawing& drawing,
+                  const std::vector<std::pair<cv::Point2d, std::string>>& labels) {
+  std::vector<cv::Rect2d> taken;
+  for (const auto& [at, words] : labels) {
+    const double width = kCharacter * static_cast<double>(words.size());
+    for (const double down : {0.0, 15.0, -15.0, 30.0, -30.0}) {
+      const bool fits = at.x + 8.0 + width < drawing.right;
+      const cv::Rect2d box(fits ? at.x + 8.0 : at.x - 8.0 - width, at.y + down - 8.0, width, 14.0);
+      if (std::any_of(taken.begin(), taken.end(),
+                      [&](const cv::Rect2d& other) { return (box & other).area() > 0.0; })) {
+        continue;
+      }
+      taken.push_back(box);
+      drawing.text(box.x, at.y + down + 4.0, words, "start", kSoft);
+      break;
     }
   }
-  return ranges;
-}
-
-std::vector<LegendSample> series_legend(const std::vector<Series>& all) {
-  std::vector<LegendSample> samples;
-  for (const Series& series : all) {
-    if (series.legend.empty()) continue;
-    const int width = series.line ? kLineWidth : 0;
-    samples.push_back(
-        {series.legend, {series.colour, width, series.dash_px}, series.marker, false});
-  }
-  return samples;
-}
-
-constexpr double kWidestBar = 180.0;
-constexpr double kGap = 8.0;  // between bars
-const Stroke kReferenceTick{palette::kBlack, 4, 0.0};
-
-// From left to right, px.
-struct Slot {
-  double x = 0.0;
-  double width = 0.0;
-};
-
-void draw_bar(cv::Mat& image, const Frame& frame, const Slot& slot, double value,
-              const BarSeries& series, const BarSpec& spec) {
-  const double base = frame(0.0, std::clamp(0.0, spec.y_min, spec.y_max)).y;
-  const double tip = frame(0.0, std::clamp(value, spec.y_min, spec.y_max)).y;
-  const cv::Point corner(static_cast<int>(slot.x),
-                         static_cast<int>(std::lround(std::min(base, tip))));
-  const cv::Size size(static_cast<int>(slot.width),
-                      std::max(1, static_cast<int>(std::lround(std::abs(base - tip)))));
-  cv::rectangle(image, cv::Rect(corner, size), series.colour, cv::FILLED);
-  if (!spec.figures) return;
-  // The figure stands at the bar's foot, where no reference mark can hide it.
-  const std::string text = fixed_decimals(value, spec.decimals);
-  const TextStyle style{.align = Align::kCentre};
-  const cv::Point at(static_cast<int>(slot.x + slot.width / 2), static_cast<int>(base) - 20);
-  const int half = text_width(text, style) / 2 + 10;
-  cv::rectangle(image, cv::Rect(at.x - half, at.y - 30, 2 * half, 40), palette::kWhite, cv::FILLED);
-  draw_text(image, at, text, style);
-}
-
-void draw_reference(cv::Mat& image, const Frame& frame, const Slot& slot, double value,
-                    const BarSpec& spec) {
-  const double y = frame(0.0, std::clamp(value, spec.y_min, spec.y_max)).y;
-  const std::vector<cv::Point2d> across = {{slot.x, y}, {slot.x + slot.width, y}};
-  draw_polyline(image, across, {palette::kWhite, 9, 0.0});
-  draw_polyline(image, across, kReferenceTick);
-}
-
-// One line per part of the name: side by side, whole names would run into each other.
-void draw_group_name(cv::Mat& image, const cv::Rect& area, double middle, const std::string& name) {
-  int baseline = area.y + area.height + 36;
-  std::istringstream lines(name);
-  for (std::string line; std::getline(lines, line); baseline += 28) {
-    draw_text(image, {static_cast<int>(middle), baseline}, line,
-              {.cap_px = 17.0, .align = Align::kCentre});
-  }
-}
-
-std::vector<LegendSample> bar_legend(const BarSpec& spec) {
-  std::vector<LegendSample> samples;
-  for (const BarSeries& series : spec.series)
-    samples.push_back({series.legend, {series.colour, 1, 0.0}, Marker::kNone, true});
-  if (!spec.references.empty())
-    samples.push_back({spec.reference_legend, kReferenceTick, Marker::kNone, false});
-  return samples;
 }
 
 }  // namespace
 
-cv::Mat draw_chart(const ChartSpec& spec, cv::Rect* area) {
-  cv::Mat image(spec.size, CV_8UC3, palette::kWhite);
-  const auto on_the_right = std::find_if(spec.series.begin(), spec.series.end(),
-                                         [](const Series& s) { return s.right_axis; });
-  const bool has_right = on_the_right != spec.series.end();
-  const Ranges ranges = ranges_of(spec);
-  draw_titles(image, spec.title, spec.subtitle);
-  Frame left;
-  left.area = draw_legend(image, series_legend(spec.series), has_right);
-  left.x = {spec.x, padded(ranges.x, spec.x)};
-  left.y = {spec.y, padded(ranges.left, spec.y)};
-  Frame right = left;
-  right.y = {spec.right, padded(ranges.right, spec.right)};
-  draw_y_axis(image, left);
-  draw_x_axis(image, left);
-  cv::rectangle(image, left.area, palette::kGrey, 2);
-  if (has_right) draw_right_axis(image, right, on_the_right->colour);
-
-  Labels labels(image, left.area);
-  std::vector<std::vector<std::vector<Placed>>> runs;  // per series
-  for (const Series& series : spec.series) {
-    runs.push_back(runs_of(series, series.right_axis ? right : left));
-    draw_series(image, series, runs.back());
-    if (series.marker == Marker::kNone) continue;
-    for (const auto& run : runs.back())
-      for (const Placed& p : run) labels.keep_free(p.at);
-  }
-  for (std::size_t s = 0; s < runs.size(); ++s) {
-    for (const auto& run : runs[s]) {
-      for (const Placed& p : run) {
-        if (!p.point->label.empty()) labels.write(p.point->label, p.at, spec.series[s].colour);
-      }
+std::string escape_html(std::string_view text) {
+  std::string escaped;
+  for (const char c : text) {
+    switch (c) {
+      case '&': escaped += "&amp;"; break;
+      case '<': escaped += "&lt;"; break;
+      case '>': escaped += "&gt;"; break;
+      case '"': escaped += "&quot;"; break;
+      case '\'': escaped += "&#39;"; break;
+      default: escaped += c;
     }
   }
-  if (area != nullptr) *area = left.area;
-  return image;
+  return escaped;
 }
 
-cv::Mat draw_bars(const BarSpec& spec, cv::Rect* area) {
-  cv::Mat image(spec.size, CV_8UC3, palette::kWhite);
-  const auto groups = static_cast<double>(std::max<std::size_t>(1, spec.groups.size()));
-  const auto bars = static_cast<double>(std::max<std::size_t>(1, spec.series.size()));
-  draw_titles(image, spec.title, spec.subtitle);
-  Frame frame;
-  frame.area = draw_legend(image, bar_legend(spec));
-  frame.x = {{}, {0.0, groups}};
-  frame.y = {{spec.y_label}, {spec.y_min, spec.y_max}};
-  draw_y_axis(image, frame);
-  cv::rectangle(image, frame.area, palette::kGrey, 2);
-  if (spec.y_min < 0.0) {
-    draw_polyline(image, {frame(0.0, 0.0), frame(groups, 0.0)}, {palette::kInk, 2, 0.0});
-  }
-  const double pitch = std::min(kWidestBar, 0.8 * frame.area.width / groups / bars);
-  for (std::size_t g = 0; g < spec.groups.size(); ++g) {
-    const double middle = frame(static_cast<double>(g) + 0.5, spec.y_min).x;
-    draw_group_name(image, frame.area, middle, spec.groups[g]);
-    for (std::size_t s = 0; s < spec.series.size(); ++s) {
-      const double left = middle + (static_cast<double>(s) - 0.5 * bars) * pitch;
-      const Slot slot{left + 0.5 * kGap, pitch - kGap};
-      if (const auto& value = spec.series[s].values.at(g))
-        draw_bar(image, frame, slot, *value, spec.series[s], spec);
-      if (s >= spec.references.size()) continue;
-      if (const auto& reference = spec.references[s].at(g))
-        draw_reference(image, frame, slot, *reference, spec);
+std::string draw_chart(const ChartSpec& spec) {
+  Range x, y, right_y;
+  std::vector<LegendSample> samples;
+  const Series* on_the_right = nullptr;
+  for (const Series& series : spec.series) {
+    const Axis& vertical = series.right_axis ? spec.right : spec.y;
+    Range& range = series.right_axis ? right_y : y;
+    if (series.right_axis && on_the_right == nullptr) on_the_right = &series;
+    for (const ChartPoint& p : series.points) {
+      if (!can_show(p.x, spec.x) || !can_show(p.y, vertical)) continue;
+      x.include(p.x);
+      for (const double end : {p.y - p.sd, p.y + p.sd}) {
+        if (can_show(end, vertical)) range.include(end);
+      }
     }
+    if (series.legend.empty()) continue;
+    samples.push_back({series.legend, colour_of(series.colour), series.line, false, series.dash_px,
+                       series.marker});
   }
-  if (area != nullptr) *area = frame.area;
-  return image;
+  x = padded(x, spec.x);
+  y = padded(y, spec.y);
+  right_y = padded(right_y, spec.right);
+
+  Drawing drawing(spec.size);
+  drawing.head(spec.title, spec.subtitle, samples, on_the_right != nullptr ? 64.0 : 16.0, 46.0);
+  drawing.y_axis(spec.y, y);
+  drawing.x_axis(spec.x, x);
+  if (on_the_right != nullptr) {
+    drawing.right_axis(spec.right, right_y, colour_of(on_the_right->colour));
+  }
+  std::map<double, std::string> titles;  // what stands at a place, by x in pixels
+  std::vector<std::pair<cv::Point2d, std::string>> labels;
+  for (const Series& series : spec.series) {
+    const Axis& vertical = series.right_axis ? spec.right : spec.y;
+    const Range& range = series.right_axis ? right_y : y;
+    const std::string colour = colour_of(series.colour);
+    std::vector<cv::Point2d> run, above, below, all;
+    const auto end_run = [&] {
+      if (above.size() > 1 && above != below) {
+        above.insert(above.end(), below.rbegin(), below.rend());
+        drawing.area(above, colour);
+      }
+      if (series.line && run.size() > 1) drawing.line(run, colour, 2.0, series.dash_px);
+      run.clear(), above.clear(), below.clear();
+    };
+    for (const ChartPoint& p : series.points) {
+      if (!can_show(p.x, spec.x) || !can_show(p.y, vertical)) {
+        end_run();
+        continue;
+      }
+      const cv::Point2d at(drawing.x_at(p.x, spec.x, x), drawing.y_at(p.y, vertical, range));
+      const auto edge = [&](double value) {
+        const double shown = std::clamp(value, range.min, range.max);
+        return cv::Point2d(at.x, drawing.y_at(shown, vertical, range));
+      };
+      run.push_back(at), all.push_back(at);
+      above.push_back(edge(p.y + p.sd)), below.push_back(edge(p.y - p.sd));
+      std::string& title = titles[at.x];
+      if (title.empty()) title = spec.x.label + ": " + value_text(p.x);
+      title += "\n" + (series.legend.empty() ? vertical.label : series.legend) + ": " +
+               value_text(p.y) + (p.sd > 0.0 ? " ± " + value_text(p.sd) : "");
+      if (!p.label.empty()) title += ", " + p.label;
+      if (!p.note.empty()) title += "\n" + p.note;
+      if (!p.label.empty()) labels.emplace_back(at, p.label);
+    }
+    end_run();
+    for (const cv::Point2d& at : all) drawing.marker(at, series.marker, colour);
+  }
+  write_labels(drawing, labels);
+  for (auto column = titles.begin(); column != titles.end(); ++column) {
+    const auto next = std::next(column);
+    const double from =
+        column == titles.begin() ? drawing.left : 0.5 * (std::prev(column)->first + column->first);
+    const double to = next == titles.end() ? drawing.right : 0.5 * (column->first + next->first);
+    drawing.box(from, drawing.top, to - from, drawing.bottom - drawing.top, "transparent",
+                column->second);
+  }
+  return drawing.finish(spec.title.empty() ? spec.y.label : spec.title);
+}
+
+std::string draw_bars(const BarSpec& spec) {
+  std::vector<LegendSample> samples;
+  for (const BarSeries& series : spec.series) {
+    samples.push_back({series.legend, colour_of(series.colour), false, true});
+  }
+  if (!spec.references.empty()) samples.push_back({spec.reference_legend, kInk, true});
+  Drawing drawing(spec.size);
+  drawing.head(spec.title, spec.subtitle, samples, 16.0, 58.0);
+  const Axis axis{.label = spec.y_label};
+  const Range range{spec.y_min, spec.y_max};
+  drawing.y_axis(axis, range);
+  const auto y_of = [&](double value) {
+    return drawing.y_at(std::clamp(value, spec.y_min, spec.y_max), axis, range);
+  };
+  const double base = y_of(0.0);
+  drawing.line({{drawing.left, base}, {drawing.right, base}}, kSoft, 1.0);
+  const double groups = static_cast<double>(std::max<std::size_t>(1, spec.groups.size()));
+  const double bars = static_cast<double>(std::max<std::size_t>(1, spec.series.size()));
+  const double width = (drawing.right - drawing.left) / groups;
+  const double pitch = std::min(90.0, 0.8 * width / bars);
+  for (std::size_t g = 0; g < spec.groups.size(); ++g) {
+    const double middle = drawing.left + (static_cast<double>(g) + 0.5) * width;
+    std::istringstream names(spec.groups[g]);
+    double below = drawing.bottom;
+    std::string title;
+    for (std::string name; std::getline(names, name); title += (title.empty() ? "" : ", ") + name) {
+      drawing.text(middle, below += 16.0, name, "middle", kInk);
+    }
+    for (std::size_t s = 0; s < spec.series.size(); ++s) {
+      const double x = middle + (static_cast<double>(s) - 0.5 * bars) * pitch + 2.0;
+      const auto mark = [&](double value, const std::string& name) {
+        title += "\n" + name + ": " + fmt::format("{:.1f}", value);
+      };
+      if (const auto& value = spec.series[s].values.at(g); value && std::isfinite(*value)) {
+        const double tip = y_of(*value);
+        drawing.box(x, std::min(base, tip), pitch - 4.0, std::max(1.0, std::abs(base - tip)),
+                    colour_of(spec.series[s].colour));
+        if (pitch > 34.0) {  // else it has no room; the cursor shows it
+          drawing.text(x + 0.5 * pitch - 2.0, std::min(base, tip) - 5.0, fixed_decimals(*value, 1),
+                       "middle", kInk);
+        }
+        mark(*value, spec.series[s].legend);
+      }
+      if (s >= spec.references.size()) continue;
+      if (const auto& reference = spec.references[s].at(g)) {
+        drawing.line({{x - 2.0, y_of(*reference)}, {x + pitch - 2.0, y_of(*reference)}}, kInk, 2.5);
+        mark(*reference, spec.reference_legend);
+      }
+    }
+    drawing.box(middle - 0.5 * width, drawing.top, width, drawing.bottom - drawing.top,
+                "transparent", title);
+  }
+  return drawing.finish(spec.title);
 }
 
 }  // namespace brainshift::client

@@ -1,6 +1,9 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Charts of lines and labelled points over linear or logarithmic axes, with an optional right axis;
-// and bars.
+// Charts as SVG: lines and labelled points over linear or logarithmic axes, with an optional right
+// axis; and bars. They have no script: the cursor over a column shows the values there (<title>).
+//
+// Colours of text and ground are the page's variables --ink, --soft, --rule and --ground where it
+// has them, so that a chart on a page follows its theme, and fits a white ground by itself.
 #pragma once
 
 #include <opencv2/core.hpp>
@@ -8,28 +11,37 @@
 #include <string>
 #include <vector>
 
-#include "client/tools/pictures/axes.hpp"
 #include "client/tools/pictures/canvas.hpp"
 
 namespace brainshift::client {
 
+struct Axis {
+  std::string label;      // with its unit
+  bool log = false;       // logarithmic: shows positive values only
+  bool counts = false;    // ticks at whole numbers only
+  bool from_zero = true;  // a linear axis whose values are all >= 0 starts at 0
+};
+
 struct ChartPoint {
   double x = 0.0;
   double y = 0.0;
-  std::string label;  // beside the marker; may be empty
+  std::string label = {};  // beside the marker; may be empty
+  double sd = 0.0;         // half the height of a band about the line
+  std::string note = {};   // what the cursor shows beside the values
 };
 
 struct Series {
-  std::string legend;  // empty: not in the legend
+  std::string legend;  // also names its values; empty: not in the legend
   cv::Scalar colour = palette::kBlue;
   Marker marker = Marker::kCircle;
   bool line = false;  // joins the points in the order given
   double dash_px = 0.0;
-  std::vector<ChartPoint> points;
+  std::vector<ChartPoint> points = {};
   bool right_axis = false;
 };
 
-// A point that an axis cannot show (can_show) is left out and interrupts its line.
+// A point that an axis cannot show (not finite; not positive where logarithmic) is left out and
+// interrupts its line.
 struct ChartSpec {
   std::string title;
   std::string subtitle;
@@ -37,13 +49,9 @@ struct ChartSpec {
   Axis y;
   std::vector<Series> series;
   Axis right;  // drawn where a series uses it, in the colour of the first that does
-  cv::Size size{1800, 1000};
+  cv::Size size{900, 420};
 };
-
-// 8-bit BGR. `area` receives the rectangle of the data area when it is given. The axes span all
-// points that they can show, so that at most a marker's radius is drawn outside the data area. A
-// label for which no free place is found is left out.
-cv::Mat draw_chart(const ChartSpec& spec, cv::Rect* area = nullptr);
+std::string draw_chart(const ChartSpec& spec);
 
 // Bars side by side in groups, each with an optional published value to compare it with.
 struct BarSeries {
@@ -58,19 +66,18 @@ struct BarSpec {
   std::string y_label;
   std::vector<std::string> groups;  // names, up to three lines each
   std::vector<BarSeries> series;
-  // Published values, one list per series; drawn as a black tick across the bar.
+  // Published values, one list per series; drawn as a tick across the bar.
   std::string reference_legend;
   std::vector<std::vector<std::optional<double>>> references;
   // A bar that ends outside [y_min, y_max] is cut there; its figure still shows the value.
   double y_min = 0.0;
   double y_max = 100.0;
-  int decimals = 1;
-  bool figures = true;  // the value at every bar's foot; many narrow bars have no room for them
-  cv::Size size{1800, 1000};
+  cv::Size size{900, 420};
 };
-
-// 8-bit BGR. `area` receives the rectangle of the data area when it is given.
 // Precondition: y_min < y_max; every list of values and references has one entry per group.
-cv::Mat draw_bars(const BarSpec& spec, cv::Rect* area = nullptr);
+std::string draw_bars(const BarSpec& spec);
+
+// Text inside HTML or SVG: with &, <, >, " and ' replaced by their entities.
+std::string escape_html(std::string_view text);
 
 }  // namespace brainshift::client

@@ -51,7 +51,9 @@ void set_roles(CaseView& view, const std::vector<NodeIndex>& node_of_vertex,
 void take_model(CaseView& view, const BrainModel& model) {
   std::vector<NodeIndex> node_of_vertex;
   view.tumour = model.tumour;
-  view.brain = geometry::boundary_surface(model.mesh, &node_of_vertex);
+  view.brain = geometry::surface_of(model.mesh.nodes, model.boundary_triangles, &node_of_vertex);
+  view.septa = {model.mesh.nodes, model.septa.triangles};
+  view.ventricles = {model.mesh.nodes, model.ventricle_wall};
   view.nodes = model.mesh.num_nodes();
   view.tets = model.mesh.num_tets();
   set_roles(view, node_of_vertex, model.craniotomy, model.brainstem, model.slaves);

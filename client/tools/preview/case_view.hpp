@@ -26,6 +26,7 @@ struct CaseView {
   std::optional<VoxelImage> background;  // the MRI, else the image of the brain
   TriangleSurface tumour;                // empty when it cannot be made
   TriangleSurface brain;                 // the mesh's surface; empty when there is no mesh
+  TriangleSurface septa, ventricles;     // falx and tentorium; walls; empty without labels
   int nodes = 0;                         // of the mesh
   int tets = 0;
   std::vector<NodeRole> roles;  // of the brain's vertices; empty when no sets can be selected

@@ -21,6 +21,8 @@ constexpr double kMargin_mm = 12.0;
 constexpr double kSlice_px_per_mm = 4.0;
 
 const Stroke kTumour{palette::kOrange, 5, 0.0};
+const Stroke kSeptum{palette::kGreen, 5, 0.0};
+const Stroke kVentricle{palette::kVermillion, 4, 0.0};
 const Stroke kFluidPlane{palette::kBlue, 4, 0.0};
 const Stroke kSlavePlane{palette::kBlue, 4, 12.0};
 
@@ -145,6 +147,8 @@ cv::Mat slices_picture(const CaseView& view, const Vec3& through, const std::str
   if (sheet.subtitle.empty()) sheet.subtitle = "at " + place_text(through) + "; radiological view";
   add_role_legend(view, sheet);
   sheet.legend.push_back({"tumour", kTumour});
+  if (view.septa.num_triangles() > 0) sheet.legend.push_back({"falx, tentorium", kSeptum});
+  if (view.ventricles.num_triangles() > 0) sheet.legend.push_back({"ventricles", kVentricle});
   for (const auto& [plane, name, letter] :
        {std::tuple{Plane::kAxial, "axial", "S"}, std::tuple{Plane::kCoronal, "coronal", "A"},
         std::tuple{Plane::kSagittal, "sagittal", "R"}}) {
@@ -158,6 +162,8 @@ cv::Mat slices_picture(const CaseView& view, const Vec3& through, const std::str
         panel.draw_section(part_with_role(view, style.role), {style.colour, 5, 0.0});
       }
     }
+    panel.draw_section(view.septa, kSeptum);
+    panel.draw_section(view.ventricles, kVentricle);
     panel.draw_section(view.tumour, kTumour);
     panel.draw_orientation(20.0);
     panel.draw_gravity(view.config.gravity_direction.normalized());

@@ -167,7 +167,9 @@ class Player {
       observation.active = update.estimate.contact.active;
       observation.contact_iterations = update.estimate.contact.iterations;
       observation.quality = update.estimate.quality;
+      observation.misfit_mm = update.estimate.misfit_mm.mean;
       if (!update.usable()) return;
+      observation.tumour = geometry::tumour_motion(update, options_.tumour);
       session_.last_recorded_sequence = recorded(i).observation.sequence;
       if (iterates_of_ != i) iterates_.clear();
       session_.iterates = std::move(iterates_);

@@ -18,6 +18,7 @@
 
 #include "common/core/error.hpp"
 #include "common/core/progress.hpp"
+#include "common/geometry/tumour_motion.hpp"
 #include "common/io/recording/surgery_record.hpp"
 #include "common/values/estimate.hpp"
 #include "common/values/observation.hpp"
@@ -58,6 +59,7 @@ struct PlayOptions {
   // The recording is played this many times, at least 1; more than 1 at Speed::kMax only. Sequence
   // numbers count up from cycle to cycle, else the daemon would reject them.
   int repeat = 1;
+  std::vector<NodeIndex> tumour = {};  // whose motion every answer is asked for
 };
 
 struct Iterate {
@@ -74,8 +76,10 @@ struct PlayedObservation {
   StageTimings timings;
   EstimateStatus status = EstimateStatus::kNotRun;
   QualityVerdict quality;
-  int active = 0;              // slaves that carry a contact force
-  int contact_iterations = 0;  // active-set changes
+  int active = 0;                                // slaves that carry a contact force
+  int contact_iterations = 0;                    // active-set changes
+  std::optional<geometry::TumourMotion> tumour;  // of a usable answer
+  double misfit_mm = 0.0;                        // mean over the data
   std::optional<Error> error;
   bool superseded = false;  // the daemon dropped it for a newer one before it had started
 };

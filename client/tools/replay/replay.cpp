@@ -7,6 +7,7 @@
 #include <limits>
 #include <set>
 
+#include "client/tools/replay/leave_one_out.hpp"
 #include "client/tools/replay/score.hpp"
 #include "common/contact/forward_model.hpp"
 #include "common/io/config/config_file.hpp"
@@ -165,6 +166,7 @@ Status write_fields(const fs::path& path, const BrainModel& model, const Estimat
   const Points& estimated = estimate.displacement;
   std::vector<io::NodeField> fields;
   fields.push_back({"displacement_estimated", estimated});
+  if (estimate.sd_mm.size() > 0) fields.push_back({"sd_mm", estimate.sd_mm.transpose()});
   if (estimate.known.size() > 0) fields.push_back({"known", estimate.known.transpose()});
   if (truth) {
     fields.push_back({"displacement_true", truth->displacement});
@@ -215,6 +217,54 @@ Status evaluate(const Surgery& surgery, const BrainModel& model, const PlayedSes
   return write_fields(field_file, model, update.estimate, *truth);
 }
 
+// Of the recording's last cycle.
+Result<std::vector<CoursePoint>> course_of(const Surgery& surgery, const BrainModel& model,
+                                           const PlayedSession& played,
+                                           const std::vector<NodeIndex>& tumour) {
+  std::vector<CoursePoint> course;
+  const std::size_t first = played.observations.size() - surgery.observations.size();
+  for (std::size_t i = 0; i < surgery.observations.size(); ++i) {
+    const RecordedObservation& recorded = surgery.observations[i];
+    const PlayedObservation& answer = played.observations[first + i];
+    CoursePoint& point = course.emplace_back();
+    point.time_s =
+        1e-9 * static_cast<double>(recorded.recorded_ns - surgery.observations[0].recorded_ns);
+    point.source = recorded.observation.source;
+    const auto truth = read_truth(surgery.file, recorded.observation.sequence, model);
+    if (!truth) return tl::unexpected(truth.error());
+    if (*truth && !tumour.empty()) {
+      point.true_tumour_mm = (*truth)->displacement(Eigen::all, tumour).colwise().norm().mean();
+    }
+    if (!answer.latency_ms) {
+      point.quality = answer.superseded ? "superseded" : "failed";
+      if (answer.error) point.reason = answer.error->message;
+      continue;
+    }
+    point.quality = to_string(answer.quality.quality);
+    point.reason = answer.quality.reason;
+    point.latency_ms = answer.latency_ms;
+    point.misfit_mm = answer.misfit_mm;
+    if (!answer.tumour) continue;
+    point.tumour_mm = answer.tumour->mm;
+    point.tumour_sd_mm = answer.tumour->sd_mm;
+  }
+  return course;
+}
+
+// A session of its own. What it cannot tell is a note, no failure of the replay.
+std::vector<LeftOutScore> left_out_scores(const Surgery& surgery, const ReplayOptions& options,
+                                          Boundary boundary, const Progress& progress) {
+  auto session = start_session(surgery, options, boundary);
+  auto scores =
+      session ? leave_one_out(link_to(session->client),
+                              {.session_id = session->info.session_id, .timeout = options.timeout},
+                              surgery.observations, session->model, progress)
+              : Result<std::vector<LeftOutScore>>(tl::unexpected(session.error()));
+  if (scores) return *std::move(scores);
+  if (options.on_note) options.on_note("nothing was left out to score: " + scores.error().message);
+  return {};
+}
+
 fs::path csv_path(const ReplayOptions& options, Boundary boundary) {
   if (options.boundaries.size() == 1) return options.latency_csv;
   fs::path path = options.latency_csv;
@@ -230,8 +280,9 @@ Result<RunReport> run_boundary(const Surgery& surgery, const ReplayOptions& opti
   if (!session) return tl::unexpected(session.error());
   report(progress, "prepare " + std::string(to_string(boundary)), 1.0);
 
+  const std::vector<NodeIndex> tumour = geometry::tumour_nodes(session->model);
   const PlayOptions play_options{session->info.session_id, options.speed, options.timeout,
-                                 options.repeat};
+                                 options.repeat, tumour};
   const std::string stage = "replay " + std::string(to_string(boundary));
   const PlayedSession played =
       play(link_to(session->client), surgery.observations, play_options,
@@ -253,12 +304,22 @@ Result<RunReport> run_boundary(const Surgery& surgery, const ReplayOptions& opti
       return tl::unexpected(ok.error());
     }
   }
+  auto course = course_of(surgery, session->model, played, tumour);
+  if (!course) return tl::unexpected(course.error());
+  run.course = std::move(*course);
   if (played.last) {
     const fs::path field_file =
         options.report.parent_path() /
         (options.report.stem().string() + "-" + run.scenario + "-" + run.boundary + ".vtu");
     if (Status ok = evaluate(surgery, session->model, played, field_file, run); !ok) {
       return tl::unexpected(ok.error());
+    }
+    if (const auto motion = geometry::tumour_motion(*played.last, tumour)) {
+      run.tumour_shift_mm = TumourShift{motion->mm, motion->sd_mm};
+    }
+    const bool has_truth = run.error_mm.cross || run.largest_true_displacement_mm;
+    if (!has_truth && options.method == Method::kCondensed && options.repeat == 1) {
+      run.leave_one_out = left_out_scores(surgery, options, boundary, progress);
     }
   }
   return run;

@@ -49,8 +49,11 @@ struct ReplayOptions {
 
 // Writes options.report. For each run with an estimate it writes
 // `<stem>-<scenario>-<boundary>.vtu` beside it, with the point arrays displacement_estimated,
-// where the update has it, known, and where truth is recorded, displacement_true (both mm, RAS,
-// undeformed to deformed) and error_mm.
+// where the update has them, sd_mm and known, and where truth is recorded, displacement_true (both
+// mm, RAS, undeformed to deformed) and error_mm.
+//
+// Where no truth is recorded, a second session of method condensed leaves data out and predicts
+// them (leave_one_out.hpp), unless the recording is repeated.
 //
 // The score is that of the last observation (of the last cycle) whose answer was usable
 // (Update::usable), against the truth recorded with that observation. A run whose every field was

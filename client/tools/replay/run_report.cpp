@@ -80,7 +80,7 @@ void visit(A& a, QualityCounts& v) {
 template <typename A>
 void visit(A& a, RunQuality& v) {
   a("worst", v.worst), a("last", v.last), a("reason", v.reason), a("counts", v.counts);
-  a("flags", v.flags);
+  a("flags", v.flags), a("last_flags", v.last_flags);
 }
 template <typename A>
 void visit(A& a, PartStrength& v) {
@@ -89,6 +89,23 @@ void visit(A& a, PartStrength& v) {
 template <typename A>
 void visit(A& a, WeightedStrengths& v) {
   a("scales", v.scales), a("weight", v.weight);
+}
+template <typename A>
+void visit(A& a, TumourShift& v) {
+  a("mean", v.mean), a("sd", v.sd);
+}
+template <typename A>
+void visit(A& a, CoursePoint& v) {
+  a("time_s", v.time_s), a("source", v.source), a("quality", v.quality), a("reason", v.reason);
+  a("tumour_mm", v.tumour_mm), a("tumour_sd_mm", v.tumour_sd_mm);
+  a("true_tumour_mm", v.true_tumour_mm), a("misfit_mm", v.misfit_mm);
+  a("latency_ms", v.latency_ms);
+}
+template <typename A>
+void visit(A& a, LeftOutScore& v) {
+  a("source", v.source), a("kind", v.kind), a("points", v.points), a("failed", v.failed);
+  a("initial", v.initial), a("rigid", v.rigid), a("error", v.error);
+  a("coverage_90", v.coverage_90);
 }
 template <typename A>
 void visit(A& a, RunReport& v) {
@@ -102,12 +119,15 @@ void visit(A& a, RunReport& v) {
   a("reason", v.reason), a("quality", v.quality);
   a("latency_ms", v.latency_ms), a("cold_ms", v.cold_ms);
   a("first_iterate_ms", v.first_iterate_ms), a("stages_ms", v.stages_ms);
+  a("tumour_shift_mm", v.tumour_shift_mm), a("course", v.course);
+  a("leave_one_out", v.leave_one_out);
   a("error_mm", v.error_mm), a("recovery_pct", v.recovery_pct);
   a("craniotomy_recovery_pct", v.craniotomy_recovery_pct);
   a("craniotomy_displacement_recovery_pct", v.craniotomy_displacement_recovery_pct);
   a("field_error_pct", v.field_error_pct), a("share_below_5_pct", v.share_below_5_pct);
   a("largest_true_displacement_mm", v.largest_true_displacement_mm);
   a("coverage_90", v.coverage_90), a("region_known", v.region_known), a("contact", v.contact);
+  a("ventricle_change_cc", v.ventricle_change_cc);
   a("principal_direction_deg", v.principal_direction_deg);
   a("principal_direction_true_deg", v.principal_direction_true_deg);
   a("truth_scalars", v.truth_scalars), a("left_out", v.left_out), a("failures", v.failures);

@@ -85,7 +85,8 @@ struct RunQuality {
   std::string last;    // of the last final update
   std::string reason;  // of the last final update
   QualityCounts counts;
-  std::map<std::string, int> flags;  // name of each flag that was set -> number of updates
+  std::map<std::string, int> flags;          // name of each flag that was set -> number of updates
+  std::vector<std::string> last_flags = {};  // of the last final update
 };
 
 // Strength of one part of the prior in the last usable update.
@@ -100,6 +101,36 @@ struct PartStrength {
 struct WeightedStrengths {
   std::map<std::string, double> scales;  // by part
   double weight = 1.0;
+};
+
+// Mean motion of the tumour's nodes and its standard deviation (geometry::TumourMotion), mm.
+struct TumourShift {
+  double mean = 0.0;
+  std::optional<double> sd;
+};
+
+// One observation of the recording and what became of it; of several cycles the last.
+struct CoursePoint {
+  double time_s = 0.0;  // since the first observation, when it was recorded
+  std::string source;
+  std::string quality;  // of its update; "failed", "superseded" without one
+  std::string reason;   // why it is not good, or failed
+  std::optional<double> tumour_mm, tumour_sd_mm;  // of a usable update
+  std::optional<double> true_tumour_mm;           // where truth is recorded
+  std::optional<double> misfit_mm;
+  std::optional<double> latency_ms;
+};
+
+// What was left out and predicted from the rest, of one source (leave_one_out.hpp). Distances, mm.
+struct LeftOutScore {
+  std::string source;
+  std::string kind;  // "landmarks", "tumour boundary", "cortical surface"
+  int points = 0;
+  int failed = 0;                     // points without a prediction: the rest gave no usable update
+  MeanStd initial = {};               // from the undeformed brain
+  std::optional<MeanStd> rigid = {};  // from a rigid fit to the rest; landmarks only
+  MeanStd error = {};                 // from the prediction
+  std::optional<double> coverage_90 = {};  // share inside the 90 % interval; landmarks only
 };
 
 struct RunReport {
@@ -130,6 +161,10 @@ struct RunReport {
   std::optional<double> first_iterate_ms;        // median; message sent -> first iterate received
   std::optional<StageTimings> stages_ms;         // medians over the final updates
 
+  std::optional<TumourShift> tumour_shift_mm;
+  std::vector<CoursePoint> course;
+  std::vector<LeftOutScore> leave_one_out;  // of runs without a truth
+
   RunErrors error_mm;
   std::optional<double> recovery_pct;
   std::optional<double> craniotomy_recovery_pct;               // by closest-point distance
@@ -138,7 +173,8 @@ struct RunReport {
   std::optional<double> share_below_5_pct;
   std::optional<double> largest_true_displacement_mm;
   std::optional<double> coverage_90;
-  std::optional<double> region_known;  // Estimate::region_known
+  std::optional<double> region_known;         // Estimate::region_known
+  std::optional<double> ventricle_change_cc;  // Estimate::ventricle_change_mm3
   std::optional<ContactSummary> contact;
   std::optional<double> principal_direction_deg;
   std::optional<double> principal_direction_true_deg;

@@ -15,7 +15,6 @@ namespace brainshift::client {
 namespace {
 
 constexpr double kFieldErrorLimitPct = 5.0;  // "the majority (>99 %) were less than 5 %", paper 3.1
-constexpr double kNormalQuantile90 = 1.6448536269514722;  // two-sided 90 % of a standard normal
 
 const std::vector<io::ScorePoint>* points_of_kind(const io::SurgeryTruth& truth, const char* kind) {
   const auto found = truth.points.find(kind);
@@ -54,7 +53,8 @@ Status score_craniotomy(const BrainModel& model, const io::SurgeryTruth& truth,
   error.craniotomy_displacement = mean_std_of_norms(moved - moved_truly);
 
   std::vector<NodeIndex> node_of_vertex;
-  TriangleSurface deformed = geometry::boundary_surface(model.mesh, &node_of_vertex);
+  TriangleSurface deformed =
+      geometry::surface_of(model.mesh.nodes, model.boundary_triangles, &node_of_vertex);
   deformed.vertices += truth.displacement(Eigen::all, node_of_vertex);
   const auto surface = geometry::ClosestPointIndex::build(deformed);
   if (!surface) return tl::unexpected(surface.error());
@@ -166,6 +166,9 @@ void describe(const BrainModel& model, const Estimate& estimate, RunReport& run)
   run.reason = estimate.reason;
   run.contact = estimate.contact;
   if (!std::isnan(estimate.region_known)) run.region_known = estimate.region_known;
+  if (!std::isnan(estimate.ventricle_change_mm3)) {
+    run.ventricle_change_cc = estimate.ventricle_change_mm3 / 1000.0;
+  }
   run.error_mm.sparse_initial = estimate.initial_misfit_mm;
   run.error_mm.sparse = estimate.misfit_mm;
   run.principal_direction_deg = angle_to_gravity(estimate.displacement, model.gravity_direction);

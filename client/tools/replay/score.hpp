@@ -25,6 +25,9 @@
 
 namespace brainshift::client {
 
+// Two-sided 90 % of a standard normal.
+inline constexpr double kNormalQuantile90 = 1.6448536269514722;
+
 // kUnreadable when the truth does not fit a mesh of so many nodes:
 // another count, a value that is not finite, a score point outside the
 // mesh (named by kind and index), weights that do not sum to 1.

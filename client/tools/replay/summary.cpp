@@ -32,6 +32,9 @@ RunQuality quality_of(const std::vector<const QualityVerdict*>& verdicts) {
   quality.worst = to_string(worst);
   quality.last = to_string(verdicts.back()->quality);
   quality.reason = verdicts.back()->reason;
+  for (const QualityFlag flag : kAllQualityFlags) {
+    if (verdicts.back()->flags.has(flag)) quality.last_flags.emplace_back(to_string(flag));
+  }
   return quality;
 }
 

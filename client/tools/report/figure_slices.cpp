@@ -29,7 +29,8 @@ const Stroke kSliceEstimated{palette::kOrange, 3, 0.0};
 struct Estimated {
   std::string boundary;
   const Points* displacement = nullptr;
-  Points known = {};  // 3 x n, what is known in the first row; no columns: not told
+  // 3 x n, their values in the first row; no columns: not told.
+  Points known = {}, sd_mm = {};
 };
 
 // One group's fields on one mesh.
@@ -57,8 +58,10 @@ double largest_in_plane(const SliceSamples& samples, const Points& field,
   return largest;
 }
 
+// 0 where a boundary has no such field.
 double largest_on(const SliceSamples& samples, const Points& field) {
   double largest = 0.0;
+  if (field.cols() == 0) return largest;
   for (const auto& location : samples.locations)
     largest = std::max(largest, geometry::value_at(location, field).norm());
   return largest;
@@ -322,9 +325,11 @@ std::vector<Figure> slice_figures(const RunGroup& group, const std::vector<Repor
     Estimated& added = scene.estimates.emplace_back();
     added.boundary = run->report.boundary;
     added.displacement = &run->field->estimated;
-    const VecX& known = run->field->known;
-    added.known = Points::Zero(3, known.size());
-    added.known.row(0) = known;
+    for (const auto& [to, from] : {std::pair{&added.known, &run->field->known},
+                                   std::pair{&added.sd_mm, &run->field->sd_mm}}) {
+      *to = Points::Zero(3, from->size());
+      to->row(0) = *from;
+    }
   }
 
   const std::string what =
@@ -346,17 +351,21 @@ std::vector<Figure> slice_figures(const RunGroup& group, const std::vector<Repor
                            what + ".",
                        close_up_sheet(scene, plane)});
   }
-  const bool tells = std::any_of(scene.estimates.begin(), scene.estimates.end(),
-                                 [](const Estimated& e) { return e.known.cols() > 0; });
-  if (tells) {
+  const auto add_map = [&](const char* file, const std::string& caption, Points Estimated::*values,
+                           Sheet sheet) {
+    const bool tells = std::any_of(scene.estimates.begin(), scene.estimates.end(),
+                                   [&](const Estimated& e) { return (e.*values).cols() > 0; });
+    if (!tells) return;
     figures.push_back(
-        {"known-" + group.name + ".png",
-         "Where the field is known: 1, the data say it; 0, it is a guess of the prior; " + what +
-             ".",
+        {file + group.name + ".png", caption + what + ".",
          map_sheet(
-             scene, [](const Estimated& e) { return e.known; },
-             map_of("What the data know", "share of the variance taken away", 1.0))});
-  }
+             scene, [&](const Estimated& e) { return e.*values; }, std::move(sheet))});
+  };
+  add_map("sd-", "How sure the field is: standard deviation of each displacement component; ",
+          &Estimated::sd_mm,
+          map_of("Standard deviation of the estimate", "standard deviation (mm)"));
+  add_map("known-", "Where the field is known: 1, the data say it; 0, it is a guess of the prior; ",
+          &Estimated::known, map_of("What the data know", "share of the sd taken away", 1.0));
   if (scene.truth == nullptr) return figures;
   figures.push_back({"difference-" + group.name + ".png",
                      "True displacement, and estimated minus true, magnified as its title says; " +

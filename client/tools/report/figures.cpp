@@ -14,7 +14,8 @@ constexpr double kGapInLine = std::numeric_limits<double>::quiet_NaN();
 
 }  // namespace
 
-Figure convergence_figure(const RunGroup& group, const RunReport& run) {
+std::optional<Figure> convergence_figure(const RunGroup& group, const RunReport& run) {
+  if (run.trace.size() < 2) return std::nullopt;
   ChartSpec spec;
   spec.title = "Convergence: " + run.scenario + ", " + run.boundary + " boundary";
   spec.subtitle = "case " + run.case_id + ", method " + run.method +
@@ -51,11 +52,69 @@ Figure convergence_figure(const RunGroup& group, const RunReport& run) {
                                [](const TracePoint& point) { return point.penetrating > 0; });
   if (any || run.boundary == to_string(Boundary::kContact)) spec.series.push_back(penetrating);
 
-  return {"convergence-" + group.name + "-" + file_name_from(run.boundary) + ".png",
-          "Misfit at the sparse data and at the cross-validation points, and number of slave nodes "
-          "penetrating the skull, per iteration; " +
-              run.scenario + ", " + run.boundary + " boundary (compare Fig. 3 of the paper).",
-          draw_chart(spec)};
+  return Figure{"convergence-" + group.name + "-" + file_name_from(run.boundary) + ".svg",
+                "Misfit at the sparse data" +
+                    std::string(run.error_mm.cross ? " and at the cross-validation points" : "") +
+                    ", and number of slave nodes penetrating the skull, per iteration; " +
+                    run.scenario + ", " + run.boundary + " boundary (compare Fig. 3 of the paper).",
+                {},
+                draw_chart(spec)};
+}
+
+std::vector<Figure> course_figures(const RunGroup& group, const RunReport& run) {
+  using Value = std::optional<double> CoursePoint::*;
+  const bool minutes = !run.course.empty() && run.course.back().time_s > 120.0;
+  const auto line = [&](const std::string& legend, const cv::Scalar& colour, Value value) {
+    Series series{.legend = legend, .colour = colour, .marker = Marker::kCircle, .line = true};
+    for (const CoursePoint& point : run.course) {
+      std::string note = point.source + ", " + point.quality;
+      if (!point.reason.empty()) note += ": " + point.reason;
+      const bool motion = value == &CoursePoint::tumour_mm;
+      series.points.push_back({point.time_s / (minutes ? 60.0 : 1.0),
+                               (point.*value).value_or(kGapInLine), "",
+                               motion ? point.tumour_sd_mm.value_or(0.0) : 0.0, note});
+    }
+    return series;
+  };
+  const auto has = [&](Value value) {
+    return std::count_if(run.course.begin(), run.course.end(),
+                         [&](const CoursePoint& p) { return (p.*value).has_value(); }) > 1;
+  };
+  struct Strip {
+    const char* name;
+    const char* label;
+    const char* caption;
+    Value value;
+    const cv::Scalar& colour;
+  };
+  const Strip strips[] = {
+      {"motion", "motion of the tumour (mm)",
+       "Mean motion of the tumour's nodes, the band its standard deviation, after every update",
+       &CoursePoint::tumour_mm, palette::kBlue},
+      {"misfit", "misfit (mm)", "Mean misfit at the data, after every update",
+       &CoursePoint::misfit_mm, palette::kVermillion},
+      {"latency", "time of the update (ms)", "From sending an observation to having its update",
+       &CoursePoint::latency_ms, palette::kGreen}};
+  std::vector<Figure> figures;
+  for (const Strip& strip : strips) {
+    if (!has(strip.value)) continue;
+    ChartSpec spec;
+    spec.size = {900, 230};
+    spec.x.label = minutes ? "time of the observation (min)" : "time of the observation (s)";
+    spec.y.label = strip.label;
+    const bool truth = strip.value == &CoursePoint::tumour_mm && has(&CoursePoint::true_tumour_mm);
+    if (truth) {
+      spec.series.push_back(line("true", palette::kOrange, &CoursePoint::true_tumour_mm));
+      spec.series.back().dash_px = 6.0;
+    }
+    spec.series.push_back(line(truth ? "estimated" : "", strip.colour, strip.value));
+    figures.push_back({"course-" + std::string(strip.name) + "-" + group.name + "-" +
+                           file_name_from(run.boundary) + ".svg",
+                       std::string(strip.caption) + (truth ? "; dashed: the truth" : "") + ".",
+                       {},
+                       draw_chart(spec)});
+  }
+  return figures;
 }
 
 std::optional<Figure> error_time_figure(const std::vector<ReportedRun>& runs) {
@@ -89,14 +148,21 @@ std::optional<Figure> error_time_figure(const std::vector<ReportedRun>& runs) {
   paper.points.push_back({1e3 * paper::kTime_s, paper::kContactCross_mm.mean, "paper"});
   spec.series.push_back(std::move(paper));
 
-  return Figure{"error-time.png",
+  return Figure{"error-time.svg",
                 "Error at the tumour against the time of one update, per method and boundary "
                 "condition. The paper's time was measured on a machine of 2009. make bench draws "
                 "the same for more methods, ranks and meshes.",
+                {},
                 draw_chart(spec)};
 }
 
-Figure recovery_figure(const std::vector<RunGroup>& groups, const std::vector<ReportedRun>& runs) {
+std::optional<Figure> recovery_figure(const std::vector<RunGroup>& groups,
+                                      const std::vector<ReportedRun>& runs) {
+  if (std::none_of(runs.begin(), runs.end(), [](const ReportedRun& run) {
+        return run.report.recovery_pct || run.report.craniotomy_recovery_pct;
+      })) {
+    return std::nullopt;
+  }
   BarSpec spec;
   spec.title = "Share of the deformation recovered";
   spec.subtitle =
@@ -141,11 +207,13 @@ Figure recovery_figure(const std::vector<RunGroup>& groups, const std::vector<Re
   spec.y_min = lowest < 0.0 ? std::max(-100.0, 1.1 * lowest - 8.0) : 0.0;
   spec.y_max = 112.0;
 
-  return {"recovery.png",
-          "Deformation recovered at the tumour (cross-validation points) and at the craniotomy "
-          "(closest-point projection distance), contact against fixed boundary. Black ticks: the "
-          "paper's simulated case.",
-          draw_bars(spec)};
+  return Figure{
+      "recovery.svg",
+      "Deformation recovered at the tumour (cross-validation points) and at the craniotomy "
+      "(closest-point projection distance), contact against fixed boundary. Ticks: the "
+      "paper's simulated case.",
+      {},
+      draw_bars(spec)};
 }
 
 }  // namespace brainshift::client

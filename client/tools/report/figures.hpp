@@ -12,24 +12,33 @@
 namespace brainshift::client {
 
 struct Figure {
-  std::string file_name;  // of the PNG
+  std::string file_name;  // of the PNG or SVG
   std::string caption;    // for the page; plain text
-  cv::Mat image;          // 8-bit BGR, kPixelRatio times its size on the page
+  cv::Mat image = {};     // 8-bit BGR, kPixelRatio times its size on the page; empty: a chart
+  std::string svg = {};   // of a chart
 };
 
-// Misfit and penetrating nodes against iteration (the paper's Fig. 3).
-Figure convergence_figure(const RunGroup& group, const RunReport& run);
+// Misfit and penetrating nodes against iteration (the paper's Fig. 3); nullopt below two
+// iterations.
+std::optional<Figure> convergence_figure(const RunGroup& group, const RunReport& run);
 
-// Recovery at tumour and craniotomy over all groups, contact and fixed, with the paper's values.
-Figure recovery_figure(const std::vector<RunGroup>& groups, const std::vector<ReportedRun>& runs);
+// A strip per quantity over the course of a run: motion of the tumour with its standard deviation,
+// beside the true one where it is recorded; misfit; time of the update. Below two updates: none.
+std::vector<Figure> course_figures(const RunGroup& group, const RunReport& run);
+
+// Recovery at tumour and craniotomy over all groups, contact and fixed, with the paper's values;
+// nullopt where no run has a truth.
+std::optional<Figure> recovery_figure(const std::vector<RunGroup>& groups,
+                                      const std::vector<ReportedRun>& runs);
 
 // Error at the tumour against the time of an update, over all runs;
 // nullopt when one method made them all.
 std::optional<Figure> error_time_figure(const std::vector<ReportedRun>& runs);
 
 // Slices of one group (the paper's Fig. 4). Axial and coronal: displacement arrows with tumour
-// outlines, and a close-up of the tumour. Axial, where truth is recorded: true field and
-// differences, error map. Empty when no run of the group has a field.
+// outlines, and a close-up of the tumour. Axial: maps of the standard deviation and of what the
+// data know, where a run has them; where truth is recorded, true field and differences, error
+// map. Empty when no run of the group has a field.
 std::vector<Figure> slice_figures(const RunGroup& group, const std::vector<ReportedRun>& runs,
                                   const Head& head);
 

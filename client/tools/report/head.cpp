@@ -57,10 +57,12 @@ Result<RunField> load_field(const std::filesystem::path& path) {
   const Eigen::MatrixXd* estimated = find("displacement_estimated");
   const Eigen::MatrixXd* truth = find("displacement_true");
   const Eigen::MatrixXd* known = find("known");
+  const Eigen::MatrixXd* sd = find("sd_mm");
   const std::tuple<const Eigen::MatrixXd*, const char*, int> arrays[] = {
       {estimated, "displacement_estimated", 3},
       {truth, "displacement_true", 3},
-      {known, "known", 1}};
+      {known, "known", 1},
+      {sd, "sd_mm", 1}};
   for (const auto& [values, name, rows] : arrays) {
     const bool required = values == estimated;
     if ((values == nullptr && required) || (values != nullptr && !fits(*values, rows))) {
@@ -74,6 +76,7 @@ Result<RunField> load_field(const std::filesystem::path& path) {
   field.estimated = *estimated;
   if (truth != nullptr) field.truth = Points(*truth);
   if (known != nullptr) field.known = known->transpose();
+  if (sd != nullptr) field.sd_mm = sd->transpose();
   field.mesh = std::move(file->mesh);
   return field;
 }

@@ -33,6 +33,7 @@ struct RunField {
   Points estimated;  // 3 x n displacement, undeformed to deformed, mm
   std::optional<Points> truth;
   VecX known = {};  // n, 0 to 1 (Estimate::known), or empty
+  VecX sd_mm = {};  // n, mm (Estimate::sd_mm), or empty
 };
 // kNotFound; kUnreadable when the array displacement_estimated is missing or an array misshapen.
 Result<RunField> load_field(const std::filesystem::path& path);

@@ -31,7 +31,9 @@ tbody th { text-align: left; font-weight: normal; white-space: normal; min-width
 .paper { background: var(--paper); }
 figure { margin: 1.5rem 0; } figure img { max-width: 100%; height: auto; border: 1px solid var(--rule); border-radius: 6px; background: #ffffff; }
 figcaption { font-size: 0.9rem; }
-p.verdict-sentence { font-size: 1.15rem; font-weight: 600; }
+p.headline { font-size: 1.25rem; margin: 1.4rem 0 0.2rem; } p.more { margin: 0.1rem 0 0.1rem 1rem; }
+figure svg { max-width: 100%; height: auto; display: block; } rect.hit:hover { fill: var(--ink); fill-opacity: 0.08; }
+figure.pair { display: inline-block; vertical-align: top; margin: 0.5rem 1rem 1rem 0; max-width: 100%; }
 table.fits { width: 100%; font-size: 0.82rem; } table.fits th, table.fits td { white-space: normal; padding: 0.3rem 0.4rem; min-width: 0; }
 table.fits tr.paper th, table.fits tr.paper td { background: var(--paper); }
 figure.slide { display: inline-block; margin: 0.5rem 1rem 1rem 0; max-width: 33rem; vertical-align: top; }
@@ -84,10 +86,12 @@ std::string section(const std::string& title, const std::string& body) {
 }
 
 std::string picture(const PagePicture& picture) {
-  return "<figure><img alt=\"" + escape_html(picture.caption) + "\" width=\"" +
+  const std::string caption =
+      "<figcaption>" + escape_html(picture.caption) + "</figcaption></figure>\n";
+  if (!picture.svg.empty()) return "<figure>" + picture.svg + caption;
+  return "<figure class=\"pair\"><img alt=\"" + escape_html(picture.caption) + "\" width=\"" +
          std::to_string(picture.width) + "\" height=\"" + std::to_string(picture.height) +
-         "\" src=\"data:image/png;base64," + io::base64_encode(picture.png) + "\"><figcaption>" +
-         escape_html(picture.caption) + "</figcaption></figure>\n";
+         "\" src=\"data:image/webp;base64," + io::base64_encode(picture.webp) + "\">" + caption;
 }
 
 std::string slide(const PageSlide& slide, std::size_t number) {
@@ -102,12 +106,30 @@ std::string slide(const PageSlide& slide, std::size_t number) {
         name, id, i, i == 1 ? " checked" : "", id, label);
     images += fmt::format(
         "<img class=\"p{}\" alt=\"{}\" width=\"{}\" height=\"{}\" "
-        "src=\"data:image/png;base64,{}\">",
-        i, label, slide.width, slide.height, io::base64_encode(slide.positions[i].png));
+        "src=\"data:image/webp;base64,{}\">",
+        i, label, slide.width, slide.height, io::base64_encode(slide.positions[i].webp));
   }
   return "<figure class=\"slide\">" + inputs + "<div class=\"stack\">" + images +
          "</div><figcaption>" + escape_html(slide.caption) + "</figcaption></figure>\n";
 }
+
+// Pictures of one group, or with nullopt of all runs; what did not fit is named.
+std::string pictures_of(std::optional<std::size_t> group,
+                        const std::vector<PagePicture>& pictures) {
+  std::string html, beside;
+  for (const PagePicture& one : pictures) {
+    if (one.group != group) continue;
+    const bool here = !one.svg.empty() || !one.webp.empty();
+    if (here) html += picture(one);
+    if (!here) beside += (beside.empty() ? "" : ", ") + escape_html(one.file_name);
+  }
+  if (!beside.empty()) {
+    html += "<p class=\"soft\">Beside this page, which is full, lie: " + beside + ".</p>\n";
+  }
+  return html;
+}
+
+std::string note(const std::string& text) { return "<p class=\"soft\">" + text + "</p>\n"; }
 
 }  // namespace
 
@@ -123,44 +145,64 @@ std::string html_page(const std::vector<ReportedRun>& runs, const std::vector<Ru
       "<h1>Brain shift: what the replays showed</h1>\n"
       "<p class=\"note\">Research software for simulation, replay and laboratory use. It is no "
       "medical device and must not guide the treatment of patients.</p>\n";
-  html += "<p class=\"verdict-sentence\">" + escape_html(verdict(runs)) + "</p>\n";
+  for (const RunGroup& group : groups) html += headline(runs[group.any()].report);
+  if (const std::string all = verdict(runs); !all.empty())
+    html += "<p>" + escape_html(all) + "</p>\n";
   html += section("Failures", failure_list(runs));
-  std::string shown;
-  for (std::size_t i = 0; i < slides.size(); ++i) shown += slide(slides[i], i);
-  html += section("Before, estimate and truth", shown);
+  const bool truth = has_truth(runs);
   html += section(
       "In short",
       summary_table(runs) +
-          "<p class=\"soft\">Each line is a run, the blue ones are published: " + kCitation +
-          " Errors are means, at points of the tumour that were not measured and by closest point "
-          "at the craniotomy.</p>\n");
+          note(
+              "Each line is a run." +
+              (truth
+                   ? " The blue ones are published: " + std::string(kCitation) +
+                         " Errors are means, at points of the tumour that were not measured and by "
+                         "closest point at the craniotomy."
+                   : std::string(" No truth is recorded."))));
+  if (const std::string table = left_out_table(runs); !table.empty()) {
+    html += section(
+        "Left out and predicted",
+        table + note("Mean &plusmn; standard deviation of distances. Landmarks one by one, "
+                     "surfaces an eighth at a time. The measurement's own error is in them; "
+                     "what all points share, such as a wrong registration, is recovered "
+                     "with the rest and does not show."));
+  }
+  for (std::size_t g = 0; g < groups.size(); ++g) {
+    std::string body;
+    for (std::size_t i = 0; i < slides.size(); ++i) {
+      if (slides[i].group == g) body += slide(slides[i], i);
+    }
+    body += pictures_of(g, pictures);
+    const RunReport& run = runs[groups[g].any()].report;
+    html += section(escape_html(run.scenario) + "<br><small class=\"soft\">method " +
+                        escape_html(run.method) + "</small>",
+                    body);
+  }
+  html += section("All runs in pictures", pictures_of({}, pictures));
   html += section("The runs", scenario_list(runs, groups));
-  html += section("Quality of the fields",
-                  quality_table(runs) +
-                      "<p class=\"soft\">What the daemon says of each final update's field. "
-                      "&ldquo;Converged&rdquo; speaks of the algorithm only. Everything else on "
-                      "this page is taken from the last update that was usable. Strengths: in "
-                      "units of the case's standard deviations.</p>\n");
-  html +=
-      section("Errors, beside the published ones",
-              error_table(runs) +
-                  "<p class=\"soft\">Mean &plusmn; standard deviation. Blue columns: " + kCitation +
-                  "</p>\n");
   html += section(
-      "Timings",
-      timing_table(runs) +
-          "<p class=\"soft\">Latency: from sending an observation to having received its final "
-          "update, on the client's clock. Stages: medians reported by the daemon.</p>\n");
-  std::string figures;
-  for (const PagePicture& p : pictures) figures += picture(p);
-  html += section("Pictures", figures);
-  const std::string sources = source_table(runs);
-  if (!sources.empty()) {
-    html += section("Instruments",
-                    sources +
-                        "<p class=\"soft\">Of each run's last update. Chi-square: how far an "
-                        "instrument lies from what the others and the prior predict for it, beside "
-                        "its expectation; p: probability of more by chance.</p>\n");
+      "Quality of the fields",
+      quality_table(runs) +
+          note("What the daemon says of each final update's field. &ldquo;Converged&rdquo; "
+               "speaks of the algorithm only. Everything else on this page is taken from "
+               "the last update that was usable. Strengths: in units of the case's standard "
+               "deviations."));
+  html += section(truth ? "Errors, beside the published ones" : "Misfit and contact",
+                  error_table(runs) +
+                      note("Mean &plusmn; standard deviation." +
+                           (truth ? " Blue columns: " + std::string(kCitation) : std::string())));
+  html +=
+      section("Timings", timing_table(runs) +
+                             note("Latency: from sending an observation to having received its "
+                                  "final update, on the client's clock. Stages: medians reported "
+                                  "by the daemon."));
+  if (const std::string sources = source_table(runs); !sources.empty()) {
+    html +=
+        section("Instruments",
+                sources + note("Of each run's last update. Chi-square: how far an instrument lies "
+                               "from what the others and the prior predict for it, beside its "
+                               "expectation; p: probability of more by chance."));
   }
   html += section("Left out of the model", left_out_list(runs));
   return html + "</body></html>\n";

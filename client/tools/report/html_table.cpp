@@ -7,21 +7,6 @@
 
 namespace brainshift::client {
 
-std::string escape_html(std::string_view text) {
-  std::string escaped;
-  for (const char c : text) {
-    switch (c) {
-      case '&': escaped += "&amp;"; break;
-      case '<': escaped += "&lt;"; break;
-      case '>': escaped += "&gt;"; break;
-      case '"': escaped += "&quot;"; break;
-      case '\'': escaped += "&#39;"; break;
-      default: escaped += c;
-    }
-  }
-  return escaped;
-}
-
 std::string number(double value, int decimals) {
   return std::isfinite(value) ? fmt::format("{:.{}f}", value, decimals) : kNothing;
 }
@@ -53,13 +38,30 @@ Table::Table(const std::vector<ReportedRun>& runs, bool with_paper)
 }
 
 void Table::row(const std::string& name, const Cell& cell, const std::vector<std::string>& paper) {
-  html_ += "<tr><th>" + name + "</th>";
-  for (const ReportedRun& run : runs_) html_ += "<td>" + cell(run.report) + "</td>";
+  std::string cells;
+  bool any = false;
+  for (const ReportedRun& run : runs_) {
+    const std::string text = cell(run.report);
+    any = any || text != kNothing;
+    cells += "<td>" + text + "</td>";
+  }
+  if (!any) return;
+  html_ += "<tr><th>" + name + "</th>" + cells;
   for (std::size_t i = 0; with_paper_ && i < 3; ++i) {
-    html_ += "<td class=\"paper\">" +
-             (i < paper.size() && !paper[i].empty() ? paper[i] : kNothing) + "</td>";
+    html_ += "<td class=\"paper\">" + (i < paper.size() ? paper[i] : "") + "</td>";
   }
   html_ += "</tr>\n";
 }
+
+std::string duration(double ms) {
+  if (!std::isfinite(ms)) return kNothing;
+  if (ms < 10.0) return fmt::format("{:.1f} ms", ms);
+  if (ms < 999.5) return fmt::format("{:.0f} ms", ms);
+  if (ms < 59950.0) return fmt::format("{:.1f} s", 1e-3 * ms);
+  if (ms < 60.0 * 59950.0) return fmt::format("{:.1f} min", ms / 60000.0);
+  return fmt::format("{:.1f} h", ms / 3600000.0);
+}
+
+std::string duration(const std::optional<double>& ms) { return ms ? duration(*ms) : kNothing; }
 
 }  // namespace brainshift::client

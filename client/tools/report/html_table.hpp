@@ -9,14 +9,11 @@
 #include <string_view>
 #include <vector>
 
+#include "client/tools/pictures/chart.hpp"
 #include "client/tools/report/head.hpp"
 #include "common/core/statistics.hpp"
 
 namespace brainshift::client {
-
-// Text of reports and case files inside an HTML page: with &, <, >, " and ' replaced by their
-// entities.
-std::string escape_html(std::string_view text);
 
 inline const std::string kNothing = "&ndash;";  // a value that there is not
 
@@ -24,10 +21,17 @@ inline const std::string kNothing = "&ndash;";  // a value that there is not
 std::string number(double value, int decimals);
 std::string number(const std::optional<double>& value, int decimals);
 std::string number(const std::optional<MeanStd>& value);  // mean and standard deviation
-std::string plain(const std::string& text);               // escaped; kNothing when empty
+// "87 ms", "1.3 s", "4.3 min"
+std::string duration(double ms);
+std::string duration(const std::optional<double>& ms);
+std::string plain(const std::string& text);  // escaped; kNothing when empty
 
-// A row: its name, a cell for each run, then the paper's columns (contact, fixed, ICP) if wanted.
-// Names and cells are HTML.
+bool has_truth(const std::vector<ReportedRun>& runs);  // of any
+std::string shift_text(const TumourShift& shift);      // "2.3 +- 0.2", HTML
+std::string quality_badge(const std::string& quality);
+
+// A row: its name, a cell for each run, then the paper's columns (contact, fixed, ICP) if wanted. A
+// row of which no run has a value is left out. Names and cells are HTML.
 class Table {
  public:
   using Cell = std::function<std::string(const RunReport&)>;

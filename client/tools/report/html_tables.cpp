@@ -88,15 +88,6 @@ void add_contact_rows(Table& table) {
 // At most this many hypotheses of a run are shown; the report holds all.
 constexpr std::size_t kMaxHypotheses = 3;
 
-std::string badge(const std::string& verdict) {
-  const char* sign = "?";
-  if (verdict == to_string(Quality::kGood)) sign = "&#10003;";
-  if (verdict == to_string(Quality::kCaution)) sign = "&#9651;";
-  if (verdict == to_string(Quality::kUnusable)) sign = "&#10005;";
-  const std::string name = escape_html(verdict);
-  return "<span class=\"verdict " + name + "\">" + sign + " " + name + "</span>";
-}
-
 Table::Cell of_quality(std::string (*text)(const RunQuality&)) {
   return [text](const RunReport& run) { return run.quality ? text(*run.quality) : kNothing; };
 }
@@ -142,6 +133,8 @@ void add_flag_rows(const std::vector<ReportedRun>& runs, Table& table) {
   }
 }
 
+std::string seconds(const std::optional<double>& s) { return s ? duration(1e3 * *s) : kNothing; }
+
 std::vector<std::string> parts_of(const std::vector<ReportedRun>& runs) {
   std::vector<std::string> parts;
   for (const ReportedRun& run : runs) {
@@ -184,18 +177,48 @@ std::string hypotheses_text(const RunReport& run) {
 
 }  // namespace
 
+std::string quality_badge(const std::string& verdict) {
+  const char* sign = "?";
+  if (verdict == to_string(Quality::kGood)) sign = "&#10003;";
+  if (verdict == to_string(Quality::kCaution)) sign = "&#9651;";
+  if (verdict == to_string(Quality::kUnusable)) sign = "&#10005;";
+  const std::string name = escape_html(verdict);
+  return "<span class=\"verdict " + name + "\">" + sign + " " + name + "</span>";
+}
+
 std::string error_table(const std::vector<ReportedRun>& runs) {
-  Table table(runs, true);
+  Table table(runs, has_truth(runs));
   add_tumour_rows(table);
   add_craniotomy_rows(table);
   add_field_rows(table);
   add_contact_rows(table);
-  table.row("time from observation to update (s)",
-            [](const RunReport& r) -> std::string {
-              return r.latency_ms ? number(1e-3 * r.latency_ms->p50, 3) : kNothing;
-            },
-            {number(paper::kTime_s, 0)});
+  table.row(
+      "time from observation to update",
+      [](const RunReport& r) { return r.latency_ms ? duration(r.latency_ms->p50) : kNothing; },
+      {duration(1e3 * paper::kTime_s)});
   return table.finish();
+}
+
+std::string left_out_table(const std::vector<ReportedRun>& runs) {
+  std::string rows;
+  for (const ReportedRun& run : runs) {
+    for (const LeftOutScore& score : run.report.leave_one_out) {
+      const auto cell = [](const std::string& text) { return "<td>" + text + "</td>"; };
+      const std::string interval =
+          score.coverage_90 ? number(100.0 * *score.coverage_90, 0) + " %" : std::string();
+      rows += "<tr>" + cell(escape_html(run.report.scenario + ", " + run.report.boundary)) +
+              cell(escape_html(score.source)) + cell(escape_html(score.kind)) +
+              cell(std::to_string(score.points)) + cell(number(score.initial)) +
+              cell(score.rigid ? number(score.rigid) : "") + cell(number(score.error)) +
+              cell(interval) + "</tr>\n";
+    }
+  }
+  if (rows.empty()) return "";
+  return "<table class=\"fits\">\n<thead><tr><th>run</th><th>instrument</th><th>what</th>"
+         "<th>points</th><th>without correction (mm)</th><th>rigid fit (mm)</th><th>predicted "
+         "(mm)</th>"
+         "<th>inside the 90 % interval</th></tr></thead>\n<tbody>" +
+         rows + "</tbody></table>\n";
 }
 
 std::string timing_table(const std::vector<ReportedRun>& runs) {
@@ -204,57 +227,64 @@ std::string timing_table(const std::vector<ReportedRun>& runs) {
     return std::to_string(r.mesh.nodes) + " / " + std::to_string(r.mesh.tets) + " / " +
            std::to_string(r.mesh.slaves);
   });
-  table.row("preparation (s)", [](const RunReport& r) { return number(r.prepare_s, 2); });
-  table.row("of it factorisation (s)", [](const RunReport& r) { return number(r.factor_s, 2); });
+  table.row("preparation", [](const RunReport& r) { return seconds(r.prepare_s); });
+  table.row("of it factorisation", [](const RunReport& r) { return seconds(r.factor_s); });
   table.row("prepared model (MiB)", [](const RunReport& r) -> std::string {
     return r.model_bytes ? number(static_cast<double>(*r.model_bytes) / (1 << 20), 0) : kNothing;
   });
-  table.row("one full solve (ms)", [](const RunReport& r) { return number(r.full_solve_ms, 1); });
+  table.row("one full solve", [](const RunReport& r) { return duration(r.full_solve_ms); });
   table.row("updates", [](const RunReport& r) { return std::to_string(r.updates); });
-  table.row("latency p50 / p95 / p99 / max (ms)", [](const RunReport& r) -> std::string {
+  table.row("latency p50 / p95 / p99 / max", [](const RunReport& r) -> std::string {
     if (!r.latency_ms) return kNothing;
-    return number(r.latency_ms->p50, 0) + " / " + number(r.latency_ms->p95, 0) + " / " +
-           number(r.latency_ms->p99, 0) + " / " + number(r.latency_ms->max, 0);
+    return duration(r.latency_ms->p50) + " / " + duration(r.latency_ms->p95) + " / " +
+           duration(r.latency_ms->p99) + " / " + duration(r.latency_ms->max);
   });
-  table.row("first update (ms)", [](const RunReport& r) { return number(r.cold_ms, 0); });
-  table.row("first streamed iterate (ms)",
-            [](const RunReport& r) { return number(r.first_iterate_ms, 0); });
+  table.row("first update", [](const RunReport& r) { return duration(r.cold_ms); });
+  table.row("first streamed iterate",
+            [](const RunReport& r) { return duration(r.first_iterate_ms); });
   const auto stage = [](double StageTimings::*member) {
     return [member](const RunReport& r) -> std::string {
-      return r.stages_ms ? number((*r.stages_ms).*member, 1) : kNothing;
+      return r.stages_ms ? duration((*r.stages_ms).*member) : kNothing;
     };
   };
-  table.row("stage: register (ms)", stage(&StageTimings::register_ms));
-  table.row("stage: invert (ms)", stage(&StageTimings::invert_ms));
-  table.row("stage: rebuild (ms)", stage(&StageTimings::rebuild_ms));
-  table.row("stage: encode (ms)", stage(&StageTimings::encode_ms));
-  table.row("stage: journal (ms)", stage(&StageTimings::journal_ms));
+  table.row("stage: register", stage(&StageTimings::register_ms));
+  table.row("stage: invert", stage(&StageTimings::invert_ms));
+  table.row("stage: rebuild", stage(&StageTimings::rebuild_ms));
+  table.row("stage: encode", stage(&StageTimings::encode_ms));
+  table.row("stage: journal", stage(&StageTimings::journal_ms));
   return table.finish();
 }
 
 std::string source_table(const std::vector<ReportedRun>& runs) {
+  const auto compared = [](const SourceSummary& source) { return !std::isnan(source.p_value); };
+  const bool several = std::any_of(runs.begin(), runs.end(), [&](const ReportedRun& run) {
+    return std::any_of(run.report.sources.begin(), run.report.sources.end(), compared);
+  });
   std::string rows;
   for (const ReportedRun& run : runs) {
     for (const SourceSummary& source : run.report.sources) {
       const auto cell = [](const std::string& text) { return "<td>" + text + "</td>"; };
-      const bool compared = !std::isnan(source.p_value);
       rows += "<tr>" + cell(escape_html(run.report.scenario + ", " + run.report.boundary)) +
               cell(escape_html(source.source)) + cell(std::to_string(source.observation_sequence)) +
               cell(number(source.age_s, 0)) + cell(std::to_string(source.data)) +
-              cell(std::to_string(source.outliers)) +
-              cell(compared
-                       ? number(source.chi_square, 1) + " / " + number(source.degrees_of_freedom, 1)
-                       : kNothing) +
-              cell(number(source.p_value, 4)) +
-              cell(source.consistent ? "yes" : "<strong>no</strong>") + "</tr>\n";
+              cell(std::to_string(source.outliers));
+      if (several) {
+        const bool has = compared(source);
+        rows +=
+            cell(has ? number(source.chi_square, 1) + " / " + number(source.degrees_of_freedom, 1)
+                     : "") +
+            cell(has ? number(source.p_value, 4) : "") +
+            cell(source.consistent ? "yes" : "<strong>no</strong>");
+      }
+      rows += "</tr>\n";
     }
   }
   if (rows.empty()) return "";
-  return "<table "
+  return "<div class=\"scroll\"><table "
          "class=\"fits\">\n<thead><tr><th>run</th><th>instrument</th><th>observation</th><th>age "
-         "(s)</th><th>data</th><th>outliers</th><th>chi-square</th><th>p</th><th>consistent</th></"
-         "tr></thead>\n<tbody>" +
-         rows + "</tbody></table>\n";
+         "(s)</th><th>data</th><th>outliers</th>" +
+         std::string(several ? "<th>chi-square</th><th>p</th><th>consistent</th>" : "") +
+         "</tr></thead>\n<tbody>" + rows + "</tbody></table></div>\n";
 }
 
 std::string left_out_list(const std::vector<ReportedRun>& runs) {
@@ -264,7 +294,8 @@ std::string left_out_list(const std::vector<ReportedRun>& runs) {
       std::string item =
           "<li><strong>" + escape_html(omission.part) +
           "</strong>: " + escape_html(omission.reason) +
-          " <span class=\"soft\">(estimated error: " + plain(omission.estimated_error) +
+          " <span class=\"soft\">(estimated error: " +
+          (omission.estimated_error.empty() ? "not known" : escape_html(omission.estimated_error)) +
           ")</span></li>\n";
       if (std::find(items.begin(), items.end(), item) == items.end())
         items.push_back(std::move(item));
@@ -293,8 +324,8 @@ std::string failure_list(const std::vector<ReportedRun>& runs) {
 
 std::string quality_table(const std::vector<ReportedRun>& runs) {
   Table table(runs, false);
-  table.row("worst update", of_quality([](const RunQuality& q) { return badge(q.worst); }));
-  table.row("last update", of_quality([](const RunQuality& q) { return badge(q.last); }));
+  table.row("worst update", of_quality([](const RunQuality& q) { return quality_badge(q.worst); }));
+  table.row("last update", of_quality([](const RunQuality& q) { return quality_badge(q.last); }));
   table.row("reason given with the last update", of_quality([](const RunQuality& q) {
               return "<span class=\"words\">" + plain(q.reason) + "</span>";
             }));

@@ -62,55 +62,111 @@ Result<std::map<std::string, Head>> load_heads(const std::vector<ReportedRun>& r
   return heads;
 }
 
-std::vector<Figure> draw_figures(const std::vector<ReportedRun>& runs,
-                                 const std::vector<RunGroup>& groups,
-                                 const std::map<std::string, Head>& heads,
-                                 const Progress& progress) {
-  std::vector<Figure> figures;
-  figures.push_back(recovery_figure(groups, runs));
-  if (auto figure = error_time_figure(runs)) figures.push_back(std::move(*figure));
+// A page takes at most 5 MB. Of the pictures so many bytes are embedded, in the order in which
+// they are drawn; base64 makes four of three.
+constexpr std::size_t kMostEmbedded = 3'400'000;
+constexpr int kMostColumns = 1600;
+
+// Writes figures and slides into the folder as they are drawn, and keeps what the page shows.
+class Pictures {
+ public:
+  explicit Pictures(const fs::path& out) : out_(out) {}
+
+  Status add(const Figure& figure, std::optional<std::size_t> group) {
+    PagePicture shown;
+    shown.caption = figure.caption;
+    shown.file_name = figure.file_name;
+    shown.group = group;
+    if (!figure.svg.empty()) {
+      shown.svg = figure.svg;
+      pictures.push_back(std::move(shown));
+      return io::write_file(out_ / figure.file_name, figure.svg);
+    }
+    auto webp = written(figure.file_name, figure.image);
+    if (!webp) return tl::unexpected(webp.error());
+    shown.webp = std::move(*webp);
+    shown.width = figure.image.cols / kPixelRatio;
+    shown.height = figure.image.rows / kPixelRatio;
+    pictures.push_back(std::move(shown));
+    return {};
+  }
+
+  Status add(const Slide& slide, std::size_t group) {
+    PageSlide page{.positions = {}, .caption = slide.caption, .group = group};
+    bool whole = true;
+    for (const SlidePosition& position : slide.positions) {
+      auto webp = written(slide.file_name + "-" + position.label + ".png", position.image);
+      if (!webp) return tl::unexpected(webp.error());
+      whole = whole && !webp->empty();
+      page.positions.push_back({position.label, std::move(*webp)});
+      page.width = position.image.cols;
+      page.height = position.image.rows;
+    }
+    if (whole) slides.push_back(std::move(page));
+    if (!whole) {
+      pictures.push_back({slide.caption, {}, {}, slide.file_name + "-*.png", 0, 0, group});
+    }
+    return {};
+  }
+
+  std::vector<PagePicture> pictures;
+  std::vector<PageSlide> slides;
+
+ private:
+  // The PNG into the folder; returns what is embedded, nothing when the page is full.
+  Result<std::string> written(const std::string& name, const cv::Mat& image) {
+    const auto png = encode_png(name, image);
+    if (!png) return tl::unexpected(png.error());
+    if (Status ok = io::write_file(out_ / name, *png); !ok) return tl::unexpected(ok.error());
+    auto webp = encode_webp(name, image, kMostColumns);
+    if (!webp) return webp;
+    if (embedded_ + webp->size() > kMostEmbedded) return std::string();
+    embedded_ += webp->size();
+    return webp;
+  }
+
+  const fs::path& out_;
+  std::size_t embedded_ = 0;
+};
+
+// First of every group what tells most, so that a page of many groups shows that of each.
+Status draw_pictures(const std::vector<ReportedRun>& runs, const std::vector<RunGroup>& groups,
+                     const std::map<std::string, Head>& heads, const Progress& progress,
+                     Pictures& pictures) {
+  Status ok;
+  const auto add = [&](const std::optional<Figure>& figure, std::optional<std::size_t> group) {
+    if (figure && ok) ok = pictures.add(*figure, group);
+  };
+  add(recovery_figure(groups, runs), {});
+  add(error_time_figure(runs), {});
+  std::vector<std::vector<Figure>> slices(groups.size());
   for (std::size_t g = 0; g < groups.size(); ++g) {
     report(progress, "draw", static_cast<double>(g) / static_cast<double>(groups.size()));
-    const RunGroup& group = groups[g];
-    for (const auto& index : {group.contact, group.fixed}) {
-      if (index && !runs[*index].report.trace.empty()) {
-        figures.push_back(convergence_figure(group, runs[*index].report));
-      }
+    for (const auto& index : {groups[g].contact, groups[g].fixed}) {
+      if (!index) continue;
+      for (const Figure& figure : course_figures(groups[g], runs[*index].report)) add(figure, g);
     }
-    const auto head = heads.find(runs[group.any()].report.case_file);
+    const auto head = heads.find(runs[groups[g].any()].report.case_file);
     if (head == heads.end()) continue;
-    for (Figure& figure : slice_figures(group, runs, head->second))
-      figures.push_back(std::move(figure));
+    for (const Slide& slide : warped_slices(groups[g], runs, head->second)) {
+      if (ok) ok = pictures.add(slide, g);
+    }
+    slices[g] = slice_figures(groups[g], runs, head->second);
+    if (!slices[g].empty()) add(slices[g].front(), g);
+    for (Figure& figure : slices[g]) {
+      if (figure.file_name.starts_with("sd-")) add(figure, g);
+    }
+  }
+  for (std::size_t g = 0; g < groups.size(); ++g) {
+    for (std::size_t i = 1; i < slices[g].size(); ++i) {
+      if (!slices[g][i].file_name.starts_with("sd-")) add(slices[g][i], g);
+    }
+    for (const auto& index : {groups[g].contact, groups[g].fixed}) {
+      if (index) add(convergence_figure(groups[g], runs[*index].report), g);
+    }
   }
   report(progress, "draw", 1.0);
-  return figures;
-}
-
-// Writes the pictures of every position, too.
-Result<std::vector<PageSlide>> write_slides(const std::vector<ReportedRun>& runs,
-                                            const std::vector<RunGroup>& groups,
-                                            const std::map<std::string, Head>& heads,
-                                            const fs::path& out) {
-  std::vector<PageSlide> slides;
-  for (const RunGroup& group : groups) {
-    const auto head = heads.find(runs[group.any()].report.case_file);
-    if (head == heads.end()) continue;
-    for (const Slide& slide : warped_slices(group, runs, head->second)) {
-      PageSlide page;
-      page.caption = slide.caption;
-      for (const SlidePosition& position : slide.positions) {
-        const std::string name = slide.file_name + "-" + position.label + ".png";
-        auto png = encode_png(name, position.image);
-        if (!png) return tl::unexpected(png.error());
-        if (Status ok = io::write_file(out / name, *png); !ok) return tl::unexpected(ok.error());
-        page.positions.push_back({position.label, std::move(*png)});
-        page.width = position.image.cols;
-        page.height = position.image.rows;
-      }
-      slides.push_back(std::move(page));
-    }
-  }
-  return slides;
+  return ok;
 }
 
 }  // namespace
@@ -128,18 +184,10 @@ Status write_report(const ReportOptions& options, const Progress& progress) {
   }
 
   const std::vector<RunGroup> groups = group_runs(*runs);
-  std::vector<PagePicture> pictures;
-  for (const Figure& figure : draw_figures(*runs, groups, *heads, progress)) {
-    auto png = encode_png(figure.file_name, figure.image);
-    if (!png) return tl::unexpected(png.error());
-    if (Status ok = io::write_file(options.out / figure.file_name, *png); !ok) return ok;
-    pictures.push_back({std::move(*png), figure.caption, figure.image.cols / kPixelRatio,
-                        figure.image.rows / kPixelRatio});
-  }
-  const auto slides = write_slides(*runs, groups, *heads, options.out);
-  if (!slides) return tl::unexpected(slides.error());
-  if (Status ok =
-          io::write_file(options.out / "report.html", html_page(*runs, groups, pictures, *slides));
+  Pictures pictures(options.out);
+  if (Status ok = draw_pictures(*runs, groups, *heads, progress, pictures); !ok) return ok;
+  if (Status ok = io::write_file(options.out / "report.html",
+                                 html_page(*runs, groups, pictures.pictures, pictures.slides));
       !ok)
     return ok;
   std::vector<RunReport> merged;

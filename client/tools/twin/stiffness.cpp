@@ -37,7 +37,8 @@ class Tissues {
   static Result<Tissues> build(const BrainModel& model) {
     auto tumour = geometry::ClosestPointIndex::build(model.tumour);
     if (!tumour) return tl::unexpected(tumour.error());
-    auto brain = geometry::ClosestPointIndex::build(geometry::boundary_surface(model.mesh));
+    auto brain = geometry::ClosestPointIndex::build(
+        geometry::surface_of(model.mesh.nodes, model.boundary_triangles));
     if (!brain) return tl::unexpected(brain.error());
     return Tissues(model.mesh.nodes, std::move(*tumour), std::move(*brain));
   }

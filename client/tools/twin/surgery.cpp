@@ -285,7 +285,7 @@ Result<SimulatedSurgery> play_given(const BrainModel& model, const CaseConfig& c
   scenario.contact_free = false;
   const auto brain = truth_brain(model, config, scenario, seed);
   if (!brain) return tl::unexpected(brain.error());
-  auto pairs = contact::search_contact(model.mesh.nodes, model.slaves, model.skull);
+  auto pairs = contact::contact_pairs(model);
   if (!pairs) return tl::unexpected(pairs.error());
   GivenTruth given(std::move(displacement),
                    contact::PenaltyContact(std::move(*pairs), config.contact.penalty_n_per_mm));

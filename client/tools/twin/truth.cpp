@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "client/tools/twin/truth.hpp"
 
+#include <Eigen/Geometry>
+#include <map>
 #include <string>
 #include <utility>
 
@@ -58,6 +60,32 @@ void set_gaps(std::uint64_t seed, const Points& nodes, std::vector<contact::Cont
   for (contact::ContactPair& pair : pairs) {
     const double part = normal_cdf(field.at(nodes.col(pair.slave)));
     pair.initial_penetration_mm = -(kMinGap_mm + (kMaxGap_mm - kMinGap_mm) * part);
+  }
+}
+
+// Sheets of falx and tentorium: nodes of one side, by the mean normal of its facets there. At a free
+// edge those of both sides cancel.
+void add_septa(const BrainModel& model, const fem::DisplacementSpace& space,
+               const std::vector<Hold>& hold, std::vector<contact::ContactPair>& pairs) {
+  std::map<NodeIndex, std::pair<Vec3, double>> into;  // areas as vectors and as numbers
+  for (const auto& face : model.septa.triangles.colwise()) {
+    const Vec3 a = space.nodes.col(face[0]);
+    const Vec3 area = Vec3(space.nodes.col(face[1]) - a).cross(Vec3(space.nodes.col(face[2]) - a));
+    const auto nodes = fem::face_nodes(space, face);
+    const int first = space.element == fem::Element::kP1 ? 0 : 3;
+    for (int k = first; k < space.nodes_per_face(); ++k) {
+      auto& sum =
+          into.try_emplace(nodes[static_cast<std::size_t>(k)], Vec3::Zero(), 0.0).first->second;
+      sum.first -= area;
+      sum.second += area.norm();
+    }
+  }
+  for (const auto& [node, sum] : into) {
+    if (sum.first.norm() < 0.1 * sum.second || hold[static_cast<std::size_t>(node)] == Hold::kFixed)
+      continue;
+    const Vec3 normal = sum.first.normalized();
+    pairs.push_back(
+        {node, space.nodes.col(node) - model.septa.gap_mm * normal, normal, -model.septa.gap_mm});
   }
 }
 
@@ -122,6 +150,7 @@ Result<contact::ForwardModel> truth_forward(const TruthBrain& brain, const Progr
   auto pairs = contact::search_contact(space.nodes, slaves, model.skull);
   if (!pairs) return tl::unexpected(pairs.error());
   if (brain.gap_seed) set_gaps(*brain.gap_seed, space.nodes, *pairs);
+  add_septa(model, space, boundary.hold, *pairs);
   double beta = brain.config.contact.penalty_n_per_mm;
   if (brain.elsewhere) {  // three edges per triangle, each in two of them
     beta *= static_cast<double>(boundary_count(brain.model)) /

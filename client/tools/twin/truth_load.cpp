@@ -9,7 +9,7 @@
 #include <numbers>
 
 #include "client/tools/twin/load.hpp"
-#include "common/contact/penalty.hpp"
+#include "common/contact/forward_model.hpp"
 #include "common/fem/body_loads.hpp"
 
 namespace brainshift::client {
@@ -168,7 +168,7 @@ bool depends_on_contact(const Scenario& scenario) {
 void ContactSeen::add(const BrainModel& model, int active, const Points& displacement) {
   active_ = active_ || active > 0;
   if (either()) return;
-  const auto pairs = contact::search_contact(model.mesh.nodes, model.slaves, model.skull);
+  const auto pairs = contact::contact_pairs(model);
   if (!pairs || pairs->empty()) return;
   const contact::PenaltyContact contact(*pairs, 1.0);
   with_the_case_ = contact.penetration(displacement).maxCoeff() > 0.0;

@@ -3,6 +3,8 @@
 // none comes for SILENCE_MS, and when events wait on their way: an old picture must not look current.
 // Places are patient RAS, mm. x: in the MRI (undeformed), p: in the room now (deformed), p = x + u(x).
 
+import { surfaceView } from "./surface.js";
+
 const SILENCE_MS = 700;
 const LATE_MS = 700;
 const SWAP_MS = 500;  // a field that is announced is fetched and drawn within this, or the old one goes grey
@@ -18,6 +20,7 @@ const MAPS = {  // stops of viridis, magma and cividis; colour-blind safe
   u: { name: "displacement", unit: "mm", stops: ["440154", "3b528b", "21918c", "5ec962", "fde725"] },
   sd: { name: "standard deviation", unit: "mm", stops: ["000004", "51127c", "b73779", "fc8961", "fcfdbf"] },
   known: { name: "what the data know", unit: "%", stops: ["00224e", "434e6c", "7d7c78", "bcae6c", "fee838"] },
+  volume: { name: "local volume change", unit: "%", signed: true, stops: ["2166ac", "92c5de", "f7f7f7", "f4a582", "b2182b"] },
 };
 for (const map of Object.values(MAPS)) map.table = colours(map.stops);
 
@@ -28,8 +31,8 @@ let state = null;        // of the newest event
 let heardAt = -Infinity; // when it came, performance.now()
 let earliest = Infinity; // smallest of (arrival - clock of the publisher): an event without a wait
 let late = 0;            // how much longer than that the newest was on its way
-let model = null;        // { model_id, grids, inside, mri, tumour }
-let field = null;        // { of, u, sd, known, vertices }
+let model = null;        // { model_id, grids, inside, mri, tumour, brain }
+let field = null;        // { of, u, sd, known, vertices, volume (when it was asked for) }
 let announcedAt = 0;     // when the newest event's field was first heard of
 let history = { of: "", count: -1, points: [] };
 let cross = [0, 0, 0];   // p of the three slices
@@ -67,6 +70,7 @@ async function loadModel() {
   made.grey = made.mri ? await bytes("mri") : null;
   const last = made.field.dims.map((n, i) => made.field.origin_mm[i] + (n - 1) * made.field.spacing_mm);
   made.low = made.field.origin_mm.map((v) => v + 8 - MARGIN_MM);  // the field's grid has a margin of 10 mm
+  made.middle = last.map((v, i) => (v + made.field.origin_mm[i]) / 2);
   made.high = last.map((v) => v - 8 + MARGIN_MM);
   field = null;
   model = made;
@@ -76,6 +80,7 @@ async function loadModel() {
     canvas.width = Math.round(PX_PER_MM * (model.high[plane.across] - model.low[plane.across]));
     canvas.height = Math.round(PX_PER_MM * (model.high[plane.up] - model.low[plane.up]));
   }
+  surface?.aim(model.low, model.high, model.centre_mm);
 }
 
 async function loadField() {
@@ -86,14 +91,36 @@ async function loadField() {
                  known: new Uint8Array(bytes, 8 * n, n) };
   const shorts = new Int16Array(bytes, 0, 3 * n);
   for (let i = 0; i < 3 * n; ++i) made.u[i] = shorts[i] / 512;
-  made.vertices = new Float32Array(model.vertices.length);
-  const u = [0, 0, 0];
-  for (let v = 0; v < made.vertices.length; v += 3) {
-    displacement(made, model.vertices[v], model.vertices[v + 1], model.vertices[v + 2], u);
-    for (let c = 0; c < 3; ++c) made.vertices[v + c] = model.vertices[v + c] + u[c];
-  }
+  made.vertices = moved(made, model.tumour.vertices);
   made.most = greatest(made, n);
   field = made;
+}
+
+function moved(of, vertices) {
+  const made = new Float32Array(vertices.length), u = [0, 0, 0];
+  for (let v = 0; v < made.length; v += 3) {
+    displacement(of, vertices[v], vertices[v + 1], vertices[v + 2], u);
+    for (let c = 0; c < 3; ++c) made[v + c] = vertices[v + c] + u[c];
+  }
+  return made;
+}
+
+// det(I + grad u) - 1 at every voxel with six neighbours in the brain, by central differences; NaN at the others.
+function volumeChange(of) {
+  const { dims, spacing_mm: s } = model.field, inside = model.inside, n = inside.length;
+  const steps = [1, dims[0], dims[0] * dims[1]], made = new Float32Array(n).fill(NaN), g = new Float64Array(9);
+  let most = 0;
+  for (let v = steps[2]; v < n - steps[2]; ++v) {
+    if (!inside[v] || !steps.every((step) => inside[v - step] && inside[v + step])) continue;
+    for (let axis = 0; axis < 3; ++axis) {
+      const before = 3 * (v - steps[axis]), behind = 3 * (v + steps[axis]);
+      for (let c = 0; c < 3; ++c) g[3 * c + axis] = (of.u[behind + c] - of.u[before + c]) / (2 * s) + (c === axis ? 1 : 0);
+    }
+    made[v] = g[0] * (g[4] * g[8] - g[5] * g[7]) - g[1] * (g[3] * g[8] - g[5] * g[6]) + g[2] * (g[3] * g[7] - g[4] * g[6]) - 1;
+    most = Math.max(most, Math.abs(made[v]));
+  }
+  of.most.volume = Math.max(0.02, Math.ceil(50 * most) / 50);
+  return made;
 }
 
 function greatest(made, n) {
@@ -122,7 +149,13 @@ async function load() {
       const count = state.history, answer = await get("history");
       history = { of: answer.headers.get("Of"), count, points: await answer.json() };
     }
-    if (newModel || newField) draw(); else drawStrips();
+    if (newModel || newField) {
+      draw();
+      // For whoever measures: which field is on the screen, and since when (ms since 1970).
+      requestAnimationFrame(() => { document.body.dataset.drawn = `${field?.of ?? ""} ${Date.now()}`; });
+    } else {
+      drawStrips();
+    }
   } catch (error) {
     console.warn(String(error));  // the next event tries again
   } finally {
@@ -275,12 +308,20 @@ function isInside(x) {
   if (i < 0 || j < 0 || k < 0 || i >= dims[0] || j >= dims[1] || k >= dims[2]) return false;
   return model.inside[i + dims[0] * (j + dims[1] * k)] === 1;
 }
-// mm, and 0 to 1 of what is known; NaN where there is none.
+// mm, 0 to 1 of what is known, and the part by which the volume has changed; NaN where there is none.
 function value(of, map, x) {
   if (map === "u") {
     const u = [0, 0, 0];
     displacement(of, x[0], x[1], x[2], u);
     return Math.hypot(u[0], u[1], u[2]);
+  }
+  if (map === "volume") {
+    of.volume ??= volumeChange(of);
+    let sum = 0, weight = 0;
+    around(model.field, x[0], x[1], x[2], (v, w) => {
+      if (!Number.isNaN(of.volume[v])) { sum += w * of.volume[v]; weight += w; }
+    });
+    return weight > 0 ? sum / weight : NaN;
   }
   const [numbers, none, scale] = map === "sd" ? [of.sd, 65535, 1000] : [of.known, 255, 250];
   let sum = 0, weight = 0;
@@ -309,15 +350,45 @@ function draw() {
   if (!model) return;
   const of = drawable(), map = chosen("map"), now = chosen("brain") === "now";
   for (const [name, plane] of Object.entries(PLANES)) drawSlice(byId(name), plane, of, map, now);
+  drawSurface(of, map, now);
   drawLegend(of, map);
   drawStrips();
   point(cross);
 }
 
+// 0 to 255 of the map's colours, NaN where there is no value.
+function shade(of, map, x) {
+  const found = value(of, map, x), share = found / of.most[map];
+  return Math.max(0, Math.min(255, Math.round(MAPS[map].signed ? 127.5 * (1 + share) : 255 * share)));
+}
+
+let surfaceShown = "";  // what of what; the cross changes nothing of it
+function drawSurface(of, map, now) {
+  const key = `${model.model_id} ${of?.of} ${map} ${now} ${byId("tumour").checked}`;
+  if (!surface || key === surfaceShown) return;
+  surfaceShown = key;
+  const { vertices, triangles } = model.brain, n = vertices.length / 3, colours = new Float32Array(3 * n).fill(0.62);
+  const table = MAPS[map]?.table, x = [0, 0, 0];
+  for (let v = 0; of && table && v < n; ++v) {
+    // A little inwards: the grid has no value at the very boundary.
+    for (let c = 0; c < 3; ++c) x[c] = vertices[3 * v + c] + 0.03 * (model.middle[c] - vertices[3 * v + c]);
+    const colour = 3 * shade(of, map, x);
+    if (Number.isNaN(colour)) continue;
+    for (let c = 0; c < 3; ++c) colours[3 * v + c] = table[colour + c] / 255;
+  }
+  const shown = [{ vertices: of && now ? moved(of, vertices) : new Float32Array(vertices), triangles, colours, opacity: 1 }];
+  if (byId("tumour").checked) {
+    const tumour = of && now ? of.vertices : new Float32Array(model.tumour.vertices), pink = new Float32Array(tumour.length);
+    for (let v = 0; v < pink.length; v += 3) pink.set([1, 0.35, 0.82], v);
+    shown.push({ vertices: tumour, triangles: model.tumour.triangles, colours: pink, opacity: 0.45 });
+  }
+  surface.show(shown);
+}
+
 function drawSlice(canvas, plane, of, map, now) {
   const context = canvas.getContext("2d"), { width, height } = canvas;
   const image = context.createImageData(width, height), data = image.data;
-  const p = [...cross], x = [0, 0, 0], u = [0, 0, 0], table = MAPS[map]?.table, most = of?.most[map];
+  const p = [...cross], x = [0, 0, 0], u = [0, 0, 0], table = MAPS[map]?.table;
   for (let py = 0, at = 0; py < height; ++py) {
     p[plane.up] = model.high[plane.up] - (py + 0.5) / PX_PER_MM;
     for (let px = 0; px < width; ++px, at += 4) {
@@ -327,9 +398,8 @@ function drawSlice(canvas, plane, of, map, now) {
       data[at] = data[at + 1] = data[at + 2] = level;
       data[at + 3] = 255;
       if (!of || !table || !isInside(x)) continue;
-      const share = value(of, map, x) / most;
-      if (Number.isNaN(share)) continue;
-      const colour = 3 * Math.max(0, Math.min(255, Math.round(255 * share)));
+      const colour = 3 * shade(of, map, x);
+      if (Number.isNaN(colour)) continue;
       for (let c = 0; c < 3; ++c) data[at + c] = 0.55 * level + 0.45 * table[colour + c];
     }
   }
@@ -337,7 +407,7 @@ function drawSlice(canvas, plane, of, map, now) {
   if (of && byId("arrows").checked) drawArrows(context, plane, of, now);
   if (byId("tumour").checked) {
     context.setLineDash([4, 3]);
-    drawSection(context, plane, model.vertices, "#7fe0ff", 1.2);
+    drawSection(context, plane, model.tumour.vertices, "#7fe0ff", 1.2);
     context.setLineDash([]);
     if (of) drawSection(context, plane, of.vertices, "#ff5ad1", 2);
   }
@@ -389,7 +459,7 @@ function drawArrows(context, plane, of, now) {
 }
 
 function drawSection(context, plane, vertices, colour, width) {
-  const level = cross[plane.normal], triangles = model.triangles, n = plane.normal;
+  const level = cross[plane.normal], triangles = model.tumour.triangles, n = plane.normal;
   context.strokeStyle = colour;
   context.lineWidth = width;
   context.beginPath();
@@ -420,8 +490,8 @@ function drawLegend(of, map) {
     context.fillStyle = `rgb(${table[c]} ${table[c + 1]} ${table[c + 2]})`;
     context.fillRect(i, 0, 1, bar.height);
   }
-  const { name, unit } = MAPS[map];
-  byId("scale").textContent = unit === "%" ? `${name}: 0 to 100 % of the uncertainty before the data`
+  const { name, unit, signed } = MAPS[map], most = of.most[map];
+  byId("scale").textContent = signed ? `${name}: −${Math.round(100 * most)} to ${Math.round(100 * most)} %` : unit === "%" ? `${name}: 0 to 100 % of the uncertainty before the data`
                                            : `${name}: 0 to ${of.most[map]} ${unit}`;
 }
 
@@ -438,6 +508,8 @@ function point(p) {
     if (now) text += ` · in the MRI: ${place(x)}`;
     text += ` · moved ${value(of, "u", x).toFixed(2)}${Number.isNaN(sd) ? "" : " ± " + sd.toFixed(2)} mm`;
     if (!Number.isNaN(known)) text += ` · ${Math.round(100 * known)} % known by the data`;
+    const volume = chosen("map") === "volume" ? value(of, "volume", x) : NaN;
+    if (!Number.isNaN(volume)) text += ` · volume ${volume < 0 ? "−" : "+"}${Math.abs(100 * volume).toFixed(1)} %`;
     if (state.grid_error_mm != null) text += ` · drawn within ${state.grid_error_mm.toFixed(2)} mm of the mesh`;
   } else if (of) {
     text += " · outside the brain";
@@ -538,6 +610,8 @@ for (const [name, strip] of Object.entries(STRIPS)) {
   canvas.addEventListener("pointerleave", drawStrips);
 }
 for (const [name, plane] of Object.entries(PLANES)) follow(name, plane);
+const surface = surfaceView(byId("surface"), byId("surface-from"));
+if (!surface) byId("surface-from").textContent = "3-D: this browser has no WebGL2";
 for (const input of document.querySelectorAll("input")) input.addEventListener("change", draw);
 window.addEventListener("resize", () => { if (model) drawStrips(); });
 matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => { if (model) drawStrips(); });

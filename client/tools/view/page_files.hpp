@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The page that browsers get: page.html, page.css and page.js, compiled in (CMakeLists.txt).
+// The page that browsers get: page.html, page.css, page.js and surface.js, compiled in
+// (CMakeLists.txt).
 #pragma once
 
 #include <string_view>
@@ -9,5 +10,6 @@ namespace brainshift::client {
 extern const std::string_view kPageHtml;
 extern const std::string_view kPageStyle;
 extern const std::string_view kPageScript;
+extern const std::string_view kSurfaceScript;
 
 }  // namespace brainshift::client

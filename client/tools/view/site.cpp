@@ -6,6 +6,8 @@
 #include <utility>
 
 #include "client/tools/view/page_files.hpp"
+#include "common/geometry/surface.hpp"
+#include "common/geometry/tumour_motion.hpp"
 
 namespace brainshift::client {
 namespace {
@@ -34,6 +36,16 @@ Json json_of(const FieldGrid& grid) {
           {"spacing_mm", grid.spacing_mm}};
 }
 
+// Hundredths of a millimetre are enough for a picture.
+Json json_of(const TriangleSurface& surface) {
+  Json vertices = Json::array();
+  for (const double mm : surface.vertices.reshaped())
+    vertices.push_back(std::round(100.0 * mm) / 100.0);
+  const auto& triangles = surface.triangles;
+  return {{"vertices", std::move(vertices)},
+          {"triangles", std::vector<int>(triangles.data(), triangles.data() + triangles.size())}};
+}
+
 constexpr const char* kJsonType = "application/json";
 constexpr const char* kBytesType = "application/octet-stream";
 
@@ -53,9 +65,9 @@ HistoryPoint history_point(const UpdateMessage& message, const std::vector<NodeI
   point.quality = message.error ? "failed" : std::string(to_string(estimate.quality.quality));
   if (message.error || !update.usable()) return point;
   point.misfit_mm = estimate.misfit_mm.mean;
-  if (tumour.empty() || tumour.back() >= estimate.displacement.cols()) return point;
-  point.motion_mm = estimate.displacement(Eigen::all, tumour).colwise().norm().mean();
-  if (estimate.sd_mm.size() > 0) point.motion_sd = estimate.sd_mm(tumour).mean();
+  const auto motion = geometry::tumour_motion(update, tumour);
+  if (motion) point.motion_mm = motion->mm;
+  if (motion) point.motion_sd = motion->sd_mm.value_or(kNoNumber);
   return point;
 }
 
@@ -105,17 +117,15 @@ std::string to_json(const std::deque<HistoryPoint>& points) {
 std::string to_json(const BrainModel& model, const FieldGrid& field,
                     const std::optional<FieldGrid>& mri) {
   const Points& vertices = model.tumour.vertices;
-  const auto& triangles = model.tumour.triangles;
   const Vec3 centre = vertices.cols() > 0 ? Vec3(vertices.rowwise().mean())
                                           : Vec3(model.mesh.nodes.rowwise().mean());
-  return line_of(
-      {{"model_id", model.model_id},
-       {"case_id", model.case_id},
-       {"centre_mm", {centre[0], centre[1], centre[2]}},
-       {"vertices", std::vector<double>(vertices.data(), vertices.data() + vertices.size())},
-       {"triangles", std::vector<int>(triangles.data(), triangles.data() + triangles.size())},
-       {"field", json_of(field)},
-       {"mri", mri ? json_of(*mri) : Json(nullptr)}});
+  return line_of({{"model_id", model.model_id},
+                  {"case_id", model.case_id},
+                  {"centre_mm", {centre[0], centre[1], centre[2]}},
+                  {"tumour", json_of(model.tumour)},
+                  {"brain", json_of(geometry::boundary_surface(model.mesh))},
+                  {"field", json_of(field)},
+                  {"mri", mri ? json_of(*mri) : Json(nullptr)}});
 }
 
 void Site::show_model(const std::string& model_id, std::string json, std::string inside,
@@ -156,6 +166,7 @@ std::optional<HttpAnswer> Site::get(std::string_view path) const {
   if (path == "/") return page("text/html; charset=utf-8", kPageHtml);
   if (path == "/page.css") return page("text/css; charset=utf-8", kPageStyle);
   if (path == "/page.js") return page("text/javascript; charset=utf-8", kPageScript);
+  if (path == "/surface.js") return page("text/javascript; charset=utf-8", kSurfaceScript);
   const std::lock_guard lock(mutex_);
   const auto held = [](const char* type, const Body& body,
                        const std::string& of) -> std::optional<HttpAnswer> {

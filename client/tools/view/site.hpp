@@ -2,9 +2,10 @@
 // Site: what browsers are shown, as one thread publishes it and the server's threads hand it out.
 // The header Of of an answer says what it belongs to.
 //
-//   /            the page; /page.css, /page.js
+//   /            the page; /page.css, /page.js, /surface.js
 //   /events      a PageState per event, several a second for as long as the publisher lives
-//   /model       JSON: model_id, case_id, tumour surface, grids of field and MRI; Of: model_id
+//   /model       JSON: model_id, case_id, surfaces of tumour and brain, grids of field and MRI;
+//                Of: model_id
 //   /inside      a byte per voxel of the field's grid: 1 in the brain; Of: model_id
 //   /mri         GreyVolume::voxels, where an MRI was given; Of: model_id
 //   /field       FieldVolume::Encoded, of the newest usable update alone; Of: PageState::field

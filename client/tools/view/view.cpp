@@ -12,11 +12,11 @@
 #include <utility>
 
 #include "client/lib/client.hpp"
-#include "client/tools/monitor/watch.hpp"
 #include "client/tools/view/http_server.hpp"
 #include "client/tools/view/site.hpp"
 #include "client/tools/view/volumes.hpp"
 #include "common/core/stopwatch.hpp"
+#include "common/geometry/tumour_motion.hpp"
 #include "common/io/geometry/image_file.hpp"
 #include "common/io/model/model_file.hpp"
 
@@ -131,7 +131,7 @@ class Viewer {
       if (!made) return tl::unexpected(made.error());
       grey = std::move(*made);
     }
-    tumour_ = tumour_nodes(*model);
+    tumour_ = geometry::tumour_nodes(*model);
     site_.show_model(
         model->model_id,
         to_json(*model, volume->grid(), grey ? std::optional(grey->grid) : std::nullopt),

@@ -243,6 +243,17 @@ const OmissionErrors& CondensedInverter::omission_errors() const { return impl_-
 VecX CondensedInverter::weights() const { return impl_->loads.weights().values(); }
 const UpdateProfile& CondensedInverter::profile() const { return impl_->profile; }
 
+PosteriorModes CondensedInverter::posterior() const {
+  const LoadDescent& descent = impl_->loads.descent();
+  const ContactReduction& contact = descent.reduction();
+  return {impl_->operators,
+          impl_->window.first,
+          descent.covariance_factor().triangularView<Eigen::Lower>(),
+          contact.active(),
+          contact.response().leftCols(impl_->window.count),
+          impl_->loads.remainder_variances()};
+}
+
 Status CondensedInverter::update(const SparseData& data, Estimate& estimate,
                                  const InversionOptions& asked) {
   Impl& impl = *impl_;

@@ -56,6 +56,18 @@ struct CondensedOptions {
   int threads = 0;  // 0: as many as cores
 };
 
+// What is left unknown of the loads after an update: modes z with covariance F F^T, and with them
+//   Cov(u) = V F F^T V^T + left out,   V = U - G_A T
+// given the active set A. A copy: it stays as it is when the inverter goes on.
+struct PosteriorModes {
+  std::shared_ptr<const CondensedOperators> operators;
+  int first_mode = 0;        // column of U that z[0] belongs to
+  Eigen::MatrixXd factor;    // F, r x r, lower
+  std::vector<int> active;   // A, slaves
+  Eigen::MatrixXd contact;   // T, k x r, N
+  Eigen::VectorXd left_out;  // kRemainders factors of truncated_variance_mm2
+};
+
 class CondensedInverter {
  public:
   // Keeps references to nothing but what it shares. kInvalidArgument when operators and locator
@@ -70,11 +82,11 @@ class CondensedInverter {
 
   // Writes every member of `estimate` in place, reusing its memory. An error leaves it as it was,
   // but for status kNotRun when the rebuilt field is what is wrong. asked.moving: data that follow
-  // the deformation. asked.stop: looked at before every step; the deadline of the case is something
-  // else: it ends with the best iterate and status kDeadline. Errors: as check_data;
-  // kInvalidArgument for data outside the brain (the sentence names the datum); stopped();
-  // kNotFinite when the result is not finite; kNotConverged when the field contradicts its contact
-  // forces (estimate_check.hpp).
+  // the deformation. asked.stop: looked at before every step and every set of contact; the deadline
+  // of the case is something else: it ends with the best iterate and status kDeadline. Errors: as
+  // check_data; kInvalidArgument for data outside the brain (the sentence names the datum);
+  // stopped(); kNotFinite when the result is not finite; kNotConverged when the field contradicts
+  // its contact forces (estimate_check.hpp).
   Status update(const SparseData& data, Estimate& estimate, const InversionOptions& asked = {});
   // Of the last update(), for the parts that the options leave out.
   const OmissionErrors& omission_errors() const;
@@ -83,6 +95,7 @@ class CondensedInverter {
   VecX weights() const;
   // Of the last update().
   const UpdateProfile& profile() const;
+  PosteriorModes posterior() const;
 
  private:
   struct Impl;

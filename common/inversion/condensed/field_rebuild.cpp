@@ -10,6 +10,9 @@
 namespace brainshift::inversion {
 namespace {
 
+// Columns of a triangular factor that are multiplied at once.
+constexpr Eigen::Index kTogether = 48;
+
 // Variance of each node's interpolation error under the prior, mm^2.
 VecX interpolation_variance(const CondensedOperators& operators, ModeWindow window,
                             ThreadTeam& team) {
@@ -99,6 +102,15 @@ void add_columns(const std::vector<const float*>& column, const std::vector<floa
   }
 }
 
+// out_i = sum over j of weight_j a_ij^2; without weights they are 1.
+void sum_squares(const Eigen::Ref<const Eigen::MatrixXf, 0, Eigen::OuterStride<>>& a,
+                 const float* weight, Eigen::Ref<Eigen::VectorXf> out) {
+  out.setZero();
+  for (Eigen::Index j = 0; j < a.cols(); ++j) {
+    out.array() += (weight != nullptr ? weight[j] : 1.0F) * a.col(j).array().square();
+  }
+}
+
 }  // namespace
 
 FieldRebuild::FieldRebuild(const CondensedOperators& operators, ModeWindow window, ThreadTeam& team,
@@ -122,6 +134,8 @@ FieldRebuild::FieldRebuild(const CondensedOperators& operators, ModeWindow windo
       contact_storage_(new float[static_cast<std::size_t>(control_contact_.size())]),
       control_variance_(static_cast<Eigen::Index>(operators.control.size())),
       control_known_(control_variance_.size()) {
+  squares_.resize(control_modes_.rows());
+  prior_at_.resize(control_modes_.rows());
   const auto most =
       static_cast<std::size_t>(window.count) + static_cast<std::size_t>(operators.num_slaves());
   terms_.reserve(most);
@@ -174,12 +188,12 @@ void FieldRebuild::gather_terms(const VecX& z, const ContactAtLoads& contact) {
   }
 }
 
-void FieldRebuild::sum_blocks(ThreadTeam& team, const std::vector<int>& blocks) {
+void FieldRebuild::sum_blocks(ThreadTeam& team, const std::vector<int>& blocks, float omitted_mm) {
   team.split(static_cast<long>(blocks.size()), [&](long begin, long end) {
     for (long i = begin; i < end; ++i) {
       const int block = blocks[static_cast<std::size_t>(i)];
-      operators_.responses.sum(block, terms_,
-                               field_.data() + 3L * operators_.responses.first_node(block));
+      operators_.responses.sum(
+          block, terms_, field_.data() + 3L * operators_.responses.first_node(block), omitted_mm);
     }
   });
 }
@@ -205,7 +219,7 @@ void FieldRebuild::displacement_at(ThreadTeam& team, const std::vector<NodeIndex
     if (!has) some_blocks_.push_back(block);
     has = 1;
   }
-  sum_blocks(team, some_blocks_);
+  sum_blocks(team, some_blocks_, 0.0F);
   for (std::size_t i = 0; i < nodes.size(); ++i) {
     u.col(static_cast<Eigen::Index>(i)) = field_.segment<3>(place(nodes[i])).cast<double>();
   }
@@ -215,7 +229,7 @@ void FieldRebuild::displacement(ThreadTeam& team, const VecX& z, const ContactAt
                                 Points& u) {
   u.resize(3, operators_.num_nodes());
   gather_terms(z, contact);
-  sum_blocks(team, blocks_);
+  sum_blocks(team, blocks_, kOmitted_mm);
   far_field_error_mm_ = 0.0;
   if (!far_.empty()) {
     sum_spare(team);
@@ -303,9 +317,14 @@ void FieldRebuild::standard_deviation(ThreadTeam& team, const ContactReduction& 
       }
       linalg::blas::multiply(-1.0F, own, response, 1.0F, v);
     }
-    linalg::blas::multiply(1.0F, v, factor_, 0.0F, spread_.middleRows(first, rows));
+    for (Eigen::Index col = 0; col < r; col += kTogether) {  // F has nothing above its diagonal
+      const Eigen::Index count = std::min<Eigen::Index>(kTogether, r - col);
+      linalg::blas::multiply(1.0F, v.rightCols(r - col), factor_.block(col, col, r - col, count),
+                             0.0F, spread_.block(first, col, rows, count));
+    }
+    sum_squares(spread_.middleRows(first, rows), nullptr, squares_.segment(first, rows));
     for (long i = begin; i < end; ++i) {
-      control_variance_[i] = static_cast<double>(spread_.middleRows<3>(3 * i).squaredNorm()) / 3.0 +
+      control_variance_[i] = static_cast<double>(squares_.segment<3>(3 * i).sum()) / 3.0 +
                              operators_.truncated_variance_mm2.row(i).dot(left_out);
     }
   });
@@ -338,15 +357,14 @@ void FieldRebuild::known(ThreadTeam& team, const linalg::blas::In<double>& expla
     const Eigen::Index first = 3 * begin, rows = 3 * (end - begin);
     const auto v = conditioned_.middleRows(first, rows);
     if (k > 0) linalg::blas::multiply(1.0F, v, x, 0.0F, seen.middleRows(first, rows));
+    sum_squares(v, prior_squares_.data(), prior_at_.segment(first, rows));
+    sum_squares(seen.middleRows(first, rows), nullptr, squares_.segment(first, rows));
     for (long i = begin; i < end; ++i) {
-      float prior = 0.0F;
-      for (long row = 3 * i; row < 3 * i + 3; ++row) {
-        prior += conditioned_.row(row).cwiseAbs2().dot(prior_squares_);
-      }
-      const double all =
-          static_cast<double>(prior) + 3.0 * operators_.truncated_variance_mm2.row(i).sum();
-      const double taken = static_cast<double>(seen.middleRows<3>(3 * i).squaredNorm());
-      control_known_[i] = all > 0.0 ? std::clamp(taken / all, 0.0, 1.0) : 0.0;
+      const double all = static_cast<double>(prior_at_.segment<3>(3 * i).sum()) +
+                         3.0 * operators_.truncated_variance_mm2.row(i).sum();
+      const double taken = static_cast<double>(squares_.segment<3>(3 * i).sum());
+      control_known_[i] =
+          all > 0.0 ? 1.0 - std::sqrt(std::clamp(1.0 - taken / all, 0.0, 1.0)) : 0.0;
     }
   });
   interpolate(team, control_known_, known);

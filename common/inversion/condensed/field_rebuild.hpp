@@ -5,7 +5,7 @@
 //   u = U z + G_A f                                            every node, single precision
 //   Cov(u) = V Cov(z) V^T + left out,   V = U - G_A T           at the control nodes, interpolated
 //                                                               to the others
-//   known = 1 - Cov_0(u) / Cov_0(u without data), traces, Cov_0: of the broad hypothesis
+//   known = 1 - sqrt(Cov_0(u) / Cov_0(u without data)), traces, Cov_0: of the broad hypothesis
 //
 // sd of a node: root mean square of its three components' standard deviations. Given the active
 // set: which slaves touch is taken as known.
@@ -15,8 +15,8 @@
 // summed, beside control and probe nodes, whose rows the constructor unpacks; the other nodes are
 // interpolated (FarField). For the same z and f the nodes of the region then have the
 // displacement that they have in the whole field, within 1e-9 mm (with the loops as they are, to
-// the bit), control and probe nodes within 1e-6 of their largest term. Does not allocate after
-// construction, but for outputs of the wrong size.
+// the bit), control and probe nodes within kOmitted_mm and 1e-6 of their largest term. Does not
+// allocate after construction, but for outputs of the wrong size.
 #pragma once
 
 #include <memory>
@@ -47,6 +47,10 @@ inline constexpr int kProbes = 64;
 // Between probes the error may be larger: up to 1.2 times the greatest probe's on the toy patient,
 // 1.04 times on the default head (tests/benchmarks/bench_scenes.cpp).
 inline constexpr double kFarFieldSafety = 2.0;
+
+// Directions of a block are left out of displacement() as long as no node of it moves by more: half
+// of what contact and field may be apart (estimate_check.hpp).
+inline constexpr float kOmitted_mm = 5e-4F;
 
 struct FarField {
   std::vector<NodeIndex> rebuilt;  // sorted; empty: every node
@@ -91,7 +95,7 @@ class FieldRebuild {
   ModeWindow window_;
   // terms_ and, for rows that are unpacked, columns_ and factors_: what is summed.
   void gather_terms(const VecX& z, const ContactAtLoads& contact);
-  void sum_blocks(ThreadTeam& team, const std::vector<int>& blocks);
+  void sum_blocks(ThreadTeam& team, const std::vector<int>& blocks, float omitted_mm);
   void sum_spare(ThreadTeam& team);
   void interpolate_far(ThreadTeam& team, const ContactAtLoads& contact, Points& u);
   Vec3 interpolated(NodeIndex node) const;
@@ -113,6 +117,7 @@ class FieldRebuild {
   // Control nodes: rows of U and G, V, and what a set needs of them.
   Eigen::MatrixXf control_modes_, control_contact_, response_, factor_, conditioned_, spread_;
   Eigen::VectorXf prior_squares_;              // variances of the modes, r
+  Eigen::VectorXf squares_, prior_at_;         // of the control nodes' rows: |row|^2
   std::unique_ptr<float[]> explained_, seen_;  // X^T, and V X^T
   std::unique_ptr<float[]> contact_storage_;
   VecX control_variance_, control_known_;

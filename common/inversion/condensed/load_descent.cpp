@@ -28,6 +28,11 @@ constexpr double kFar = 1.0;
 // Steps from afar that are shorter than this zigzag across an edge.
 constexpr double kShort = 0.1;
 
+Result<EstimateStatus> given_up(const DescentLimits& limits, int step) {
+  if (limits.stop.stop_requested()) return stopped(step);
+  return EstimateStatus::kDeadline;
+}
+
 }  // namespace
 
 LoadDescent::LoadDescent(const CondensedOperators& operators, ModeWindow window, double beta,
@@ -58,7 +63,7 @@ LoadDescent::LoadDescent(const CondensedOperators& operators, ModeWindow window,
 
 void LoadDescent::forget() {
   z_.setZero();
-  contact_at_z_ = contact_kept_ = false;
+  contact_at_z_ = contact_kept_ = has_loads_ = false;
   contact_.forget();
   reduction_.forget();
   system_.forget();
@@ -129,13 +134,13 @@ Status LoadDescent::newton_step(SampledOperators& sampled, const PriorStrengths&
   return {};
 }
 
-Status LoadDescent::solve_contact(const VecX& z) {
+Result<bool> LoadDescent::solve_contact(const VecX& z, const std::function<bool()>& give_up) {
   const StageClock clock(profile_, UpdateStage::kContact);
   auto forces = predicted_.head(reduction_.size());
   reduction_.forces_at(z, forces);
   contact_.begin_from(reduction_.active(), forces);
   contact_at_z_ = false;
-  return contact_.solve(z);
+  return contact_.solve(z, give_up);
 }
 
 Status LoadDescent::return_contact() {
@@ -143,7 +148,7 @@ Status LoadDescent::return_contact() {
   if (contact_kept_) {
     contact_.return_to_kept();
   } else {
-    if (auto status = solve_contact(z_); !status) return status;
+    if (auto solved = solve_contact(z_); !solved) return tl::unexpected(solved.error());
     contact_.keep();
   }
   contact_at_z_ = contact_kept_ = true;
@@ -153,7 +158,7 @@ Status LoadDescent::return_contact() {
 void LoadDescent::accept_trial() {
   z_ = trial_;
   contact_.keep();
-  contact_at_z_ = contact_kept_ = true;
+  contact_at_z_ = contact_kept_ = has_loads_ = true;
 }
 
 Status LoadDescent::linearise(SampledOperators& sampled, bool same_data) {
@@ -181,12 +186,24 @@ bool LoadDescent::far_from_model() const {
   return changes > std::max(6, reduction_.size() / 20);
 }
 
-Status LoadDescent::jump(SampledOperators& sampled, const PriorStrengths& strengths) {
-  if (auto status = minimise(strengths); !status) return status;
-  z_ = posterior_.z();
-  contact_at_z_ = contact_kept_ = false;
-  if (auto status = return_contact(); !status) return status;
-  return contact_.set() == reduction_.set() ? Status{} : linearise(sampled);
+Result<bool> LoadDescent::jump(SampledOperators& sampled, const PriorStrengths& strengths,
+                               const DescentLimits& limits) {
+  if (auto status = minimise(strengths); !status) return tl::unexpected(status.error());
+  trial_ = posterior_.z();
+  const auto solved = solve_contact(trial_, [this, &limits] {
+    return has_loads_ ? limits.over() : limits.stop.stop_requested();
+  });
+  if (!solved) return solved;
+  if (*solved) {
+    accept_trial();
+  } else if (limits.stop.stop_requested()) {
+    return stopped(1);
+  }
+  if (auto status = return_contact(); !status) return tl::unexpected(status.error());
+  if (contact_.set() != reduction_.set()) {
+    if (auto status = linearise(sampled); !status) return tl::unexpected(status.error());
+  }
+  return *solved;
 }
 
 Status LoadDescent::take(SampledOperators& sampled) {
@@ -203,13 +220,15 @@ Status LoadDescent::begin(SampledOperators& sampled, const PriorStrengths& stren
   return {};
 }
 
-Status LoadDescent::attempt(SampledOperators& sampled, const PriorStrengths& strengths,
-                            const VecX& whitened) {
+Result<bool> LoadDescent::attempt(SampledOperators& sampled, const PriorStrengths& strengths,
+                                  const VecX& whitened, const DescentLimits& limits) {
   posterior_.unwhiten(whitened, step_);
   trial_ = z_ + step_;
-  if (auto status = solve_contact(trial_); !status) return status;
+  const auto solved = solve_contact(trial_, [&limits] { return limits.over(); });
+  if (!solved || !*solved) return solved;
   after_ = objective(sampled, strengths, trial_);
-  return newton_step(sampled, strengths);
+  if (auto ok = newton_step(sampled, strengths); !ok) return tl::unexpected(ok.error());
+  return true;
 }
 
 Result<EstimateStatus> LoadDescent::descend(SampledOperators& sampled,
@@ -251,7 +270,9 @@ Result<EstimateStatus> LoadDescent::descend_smoothly(SampledOperators& sampled,
       length = longest = reach(penetration_, most);
     }
     change_ = length * direction_;
-    if (auto ok = attempt(sampled, strengths, change_); !ok) return tl::unexpected(ok.error());
+    const auto tried = attempt(sampled, strengths, change_, limits);
+    if (!tried) return tl::unexpected(tried.error());
+    if (!*tried) return given_up(limits, step + 1);
     const bool fell = after_ <= value_ - kSufficient * length * fall;
     if (fell) {
       penetration_ = contact_.penetration();
@@ -311,7 +332,9 @@ Result<EstimateStatus> LoadDescent::descend_to_edge(SampledOperators& sampled,
     decrement_ = std::sqrt(2.0 * std::max(0.0, bundle_.fall()));
     if (decrement_ <= kDecrement) return EstimateStatus::kConverged;
     change_ = length * bundle_.step();
-    if (auto ok = attempt(sampled, strengths, change_); !ok) return tl::unexpected(ok.error());
+    const auto tried = attempt(sampled, strengths, change_, limits);
+    if (!tried) return tl::unexpected(tried.error());
+    if (!*tried) return given_up(limits, step + 1);
     if (after_ <= value_ - kSufficientOfBundle * length * bundle_.fall()) {
       accept_trial();
       bundle_.move(change_, value_ - after_);
@@ -320,8 +343,8 @@ Result<EstimateStatus> LoadDescent::descend_to_edge(SampledOperators& sampled,
       length = 1.0;
       turns = 0;
     } else {
-      bundle_.add_at(change_, after_ - value_, next_);
-      if (++turns > kMaxTurnsOfBundle) length *= 0.5;
+      const bool kept = bundle_.add_at(change_, after_ - value_, next_);
+      if (!kept || ++turns > kMaxTurnsOfBundle) length *= 0.5;
     }
     limits.on_step();
     if (limits.out_of_time()) return EstimateStatus::kDeadline;
@@ -329,7 +352,8 @@ Result<EstimateStatus> LoadDescent::descend_to_edge(SampledOperators& sampled,
   return EstimateStatus::kIterationLimit;
 }
 
-Status LoadDescent::average(SampledOperators& sampled, PriorStrengths& strengths) {
+Result<bool> LoadDescent::average(SampledOperators& sampled, PriorStrengths& strengths,
+                                  const DescentLimits& limits) {
   auto shift = shift_.head(posterior_.unknowns());
   bool finite = false;
   {
@@ -339,18 +363,28 @@ Status LoadDescent::average(SampledOperators& sampled, PriorStrengths& strengths
   if (!finite) {
     return fail(ErrorCode::kNotFinite, "inversion: the mean over the hypotheses is not finite");
   }
-  if (auto status = return_contact(); !status) return status;
+  if (auto status = return_contact(); !status) return tl::unexpected(status.error());
   const double most_probable = misfit(sampled, strengths, z_);
   step_ = shift.tail(window_.count);
-  double length = reach(contact_.penetration(), most_changes() / 2);
-  for (;; length *= 0.5) {
-    if (length < kShortestStep) length = 0.0;
+  const bool moves = (step_.array() != 0.0).any();
+  bool in_time = !moves || !limits.over();
+  double length = moves && in_time ? reach(contact_.penetration(), most_changes() / 2) : 0.0;
+  for (; length >= kShortestStep; length *= 0.5) {
     mean_z_ = z_ + length * step_;
-    if (auto status = solve_contact(mean_z_); !status) return status;
-    if (length == 0.0 || misfit(sampled, strengths, mean_z_) <= most_probable + kLostByMean) break;
+    const auto solved = solve_contact(mean_z_, [&limits] { return limits.over(); });
+    if (!solved) return solved;
+    in_time = *solved;
+    if (!in_time) length = 0.0;
+    if (in_time && misfit(sampled, strengths, mean_z_) <= most_probable + kLostByMean) break;
+  }
+  if (limits.stop.stop_requested()) return stopped(1);
+  if (length < kShortestStep) {
+    length = 0.0;
+    mean_z_ = z_;
+    if (auto status = return_contact(); !status) return tl::unexpected(status.error());
   }
   posterior_.set_answer(length * shift.head(posterior_.unknowns() - window_.count), mean_z_);
-  return {};
+  return in_time;
 }
 
 Status LoadDescent::spread(PriorStrengths& strengths) {

@@ -60,9 +60,11 @@ inline constexpr double kRoughDecrement = 0.2;
 
 struct DescentLimits {
   int max_steps = 100;                // of one descent
-  std::stop_token stop;               // looked at before every step
-  std::function<bool()> out_of_time;  // looked at after every step
+  std::stop_token stop;               // looked at before every step and every set of contact
+  std::function<bool()> out_of_time;  // looked at after every step and before every set
   std::function<void()> on_step;      // after every step, for the history
+
+  bool over() const { return stop.stop_requested() || (out_of_time && out_of_time()); }
 };
 
 class LoadDescent {
@@ -82,8 +84,9 @@ class LoadDescent {
   // The minimum of the present linear model, for posterior(); the loads stay where they are.
   Status minimise(const PriorStrengths& strengths);
   // To the minimum of the present linear model for strengths that are new, and the linear model
-  // there.
-  Status jump(SampledOperators& sampled, const PriorStrengths& strengths);
+  // there. false when time is over: the loads stay. The first loads of an update are always found.
+  Result<bool> jump(SampledOperators& sampled, const PriorStrengths& strengths,
+                    const DescentLimits& limits = {});
   // Descends from z until decrement() is at most kDecrement (fine) or kRoughDecrement. Ends with
   // the linear model of the set at z: kConverged, kIterationLimit or kDeadline. Errors of the
   // members and stopped().
@@ -91,8 +94,10 @@ class LoadDescent {
                                  bool fine, const DescentLimits& limits);
   // The mean over the hypotheses, which were weighed for the present linear model, and contact for
   // it. Nearer to the most probable loads where contact changes in many slaves on the way, or where
-  // the mean would be less probable than those by more than kLostByMean for its misfit alone.
-  Status average(SampledOperators& sampled, PriorStrengths& strengths);
+  // the mean would be less probable than those by more than kLostByMean for its misfit alone. false
+  // when time is over: it is the most probable loads then.
+  Result<bool> average(SampledOperators& sampled, PriorStrengths& strengths,
+                       const DescentLimits& limits = {});
   // Its covariance.
   Status spread(PriorStrengths& strengths);
 
@@ -118,14 +123,16 @@ class LoadDescent {
                                          const DescentLimits& limits);
   // value_ and newton_ at z_, from the linear model there.
   Status begin(SampledOperators& sampled, const PriorStrengths& strengths);
-  // Contact, after_ and next_ at trial_ = z_ + the step whose whitened image is given.
-  Status attempt(SampledOperators& sampled, const PriorStrengths& strengths, const VecX& whitened);
+  // Contact, after_ and next_ at trial_ = z_ + the step whose whitened image is given; false when
+  // the limits are reached before.
+  Result<bool> attempt(SampledOperators& sampled, const PriorStrengths& strengths,
+                       const VecX& whitened, const DescentLimits& limits);
   bool far_from_model() const;
   int most_changes() const;
   // ContactReach::along(step_).
   double reach(const VecX& penetration, int most);
-  // Contact at z, from the forces that the linear model predicts.
-  Status solve_contact(const VecX& z);
+  // Contact at z, from the forces that the linear model predicts. false: give_up said so.
+  Result<bool> solve_contact(const VecX& z, const std::function<bool()>& give_up = {});
   // The same at z_, unless contact_ is there already.
   Status return_contact();
   // trial_ becomes z_; contact_ is there already.
@@ -160,6 +167,7 @@ class LoadDescent {
   double decrement_ = 0.0;
   bool contact_at_z_ = false;  // else at a trial or at the mean
   bool contact_kept_ = false;  // contact_ has kept that of z_
+  bool has_loads_ = false;     // z_ was found for the data of this update
 };
 
 }  // namespace brainshift::inversion

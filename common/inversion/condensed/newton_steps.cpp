@@ -2,6 +2,7 @@
 #include "common/inversion/condensed/newton_steps.hpp"
 
 #include <algorithm>
+#include <cmath>
 
 namespace brainshift::inversion {
 namespace {
@@ -9,6 +10,8 @@ namespace {
 constexpr int kMaxIterations = 20000;
 // Of the fall that is promised.
 constexpr double kTolerance = 1e-6;
+// Of the terms whose sum says where a piece lies.
+constexpr double kRounding = 1e-9;
 
 // Of |s| |y|.
 constexpr double kMinCurvature = 1e-8;
@@ -39,11 +42,14 @@ void NewtonBundle::add(const VecX& newton_step, double gap) {
 
 void NewtonBundle::add_here(const VecX& newton_step) { add(newton_step, 0.0); }
 
-void NewtonBundle::add_at(const VecX& away, double rise, const VecX& newton_step) {
+bool NewtonBundle::add_at(const VecX& away, double rise, const VecX& newton_step) {
   // q(d) = value + rise - s (d - away) + 1/2 |d - away|^2
-  const double above = rise + newton_step.dot(away) + 0.5 * away.squaredNorm();
+  const double along = newton_step.dot(away), squared = 0.5 * away.squaredNorm();
+  const double above = rise + along + squared;
+  if (above > kRounding * (std::abs(rise) + std::abs(along) + squared)) return false;
   step_ = newton_step + away;
   add(step_, std::max(0.0, -above));
+  return true;
 }
 
 void NewtonBundle::move(const VecX& d, double fall) {

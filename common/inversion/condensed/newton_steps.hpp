@@ -30,8 +30,10 @@ class NewtonBundle {
   // A piece that was met at the point: its Newton step from there.
   void add_here(const VecX& newton_step);
   // A piece that was met at a trial, `away` from the point, where the function is higher by `rise`:
-  // its Newton step from there. A piece that seems to lie above the function counts as meeting it.
-  void add_at(const VecX& away, double rise, const VecX& newton_step);
+  // its Newton step from there. False for a piece that lies above the function at the point by more
+  // than rounding: its curvature is not the identity's, it is not kept, and a shorter step is to
+  // meet it nearer.
+  [[nodiscard]] bool add_at(const VecX& away, double rise, const VecX& newton_step);
   // The point moves by d, and the function is lower by `fall` there. Pieces that then seem to lie
   // above the function are dropped.
   void move(const VecX& d, double fall);

@@ -22,7 +22,7 @@ constexpr double kSameVariance = 0.1;
 // By how much the displacement of a brain differs whose tissue is 30 % stiffer here and softer
 // there than the case says, as a part of the displacement: 0.09 to 0.15 in sag, 0.07 to 0.28 where
 // tissue swells (decisions 0018, 0037). The first value counts before any load is known.
-constexpr double kModelError = 0.1, kModelErrorOfVolume = 0.2;
+constexpr double kModelError = 0.1, kModelErrorOfVolume = 0.3;
 constexpr bool is_volume(PriorPart part) {
   return part == PriorPart::kTumourVolume || part == PriorPart::kBrainVolume;
 }
@@ -91,7 +91,7 @@ Status SettledLoads::begin(const DescentLimits& limits, EstimateStatus& outcome)
   strengths_.reset();
   set_model_error_floor();
   if (auto status = sample(); !status) return status;
-  if (auto status = distrust_outliers(); !status) return status;
+  if (auto status = distrust_outliers(limits); !status) return status;
   set_model_error_floor();  // once more, without them
   if (auto status = find_strengths(limits, outcome); !status) return status;
   if (outcome != EstimateStatus::kConverged || !set_model_error_floor_of_loads()) return {};
@@ -100,10 +100,15 @@ Status SettledLoads::begin(const DescentLimits& limits, EstimateStatus& outcome)
 
 Result<bool> SettledLoads::go_round(const InversionOptions& asked, const DescentLimits& limits,
                                     Round& round) {
-  if (auto ok = descent_.average(sampled_, strengths_); !ok) return tl::unexpected(ok.error());
+  const auto averaged = descent_.average(sampled_, strengths_, limits);
+  if (!averaged) return averaged;
   if (round.outcome != EstimateStatus::kConverged) return true;
   if (round.depth == Depth::kLast) {
     round.outcome = EstimateStatus::kIterationLimit;
+    return true;
+  }
+  if (!*averaged || (round.depth != Depth::kFine && limits.over())) {
+    round.outcome = EstimateStatus::kDeadline;
     return true;
   }
   const auto followed = follow(asked.moving);
@@ -171,8 +176,10 @@ RemainderVariances SettledLoads::remainder_variances() const {
 
 // Before strengths are fitted, which would grow until gross errors are no residuals any more:
 // weights under the case's own strengths, without contact.
-Status SettledLoads::distrust_outliers() {
+Status SettledLoads::distrust_outliers(const DescentLimits& limits) {
   for (int round = 0; round < kMaxFirstRounds; ++round) {
+    if (limits.stop.stop_requested()) return stopped(1);
+    if (round > 0 && limits.over()) return {};
     if (auto status = descent_.minimise(strengths_); !status) return status;
     if (!reweigh()) return {};
     if (auto status = sample(); !status) return status;
@@ -195,10 +202,14 @@ Result<bool> SettledLoads::refit(bool may_change) {
 Status SettledLoads::find_strengths(const DescentLimits& limits, EstimateStatus& outcome) {
   if (auto status = fit(); !status) return status;
   for (int fit = 1;; ++fit) {
-    if (auto status = descent_.jump(sampled_, strengths_); !status) return status;
-    const auto descended = descent_.descend(sampled_, strengths_, false, limits);
-    if (!descended) return tl::unexpected(descended.error());
-    outcome = *descended;
+    const auto jumped = descent_.jump(sampled_, strengths_, limits);
+    if (!jumped) return tl::unexpected(jumped.error());
+    outcome = EstimateStatus::kDeadline;
+    if (*jumped) {
+      const auto descended = descent_.descend(sampled_, strengths_, false, limits);
+      if (!descended) return tl::unexpected(descended.error());
+      outcome = *descended;
+    }
     // Strengths that change need loads of their own.
     const bool may_change = outcome == EstimateStatus::kConverged && fit < kMaxFits;
     const auto changed = refit(may_change);

@@ -85,7 +85,7 @@ class SettledLoads {
   double motion_of_part(PriorPart part);
   // Of the first `count` of norms_, which it orders anew.
   double upper_quartile(int count);
-  Status distrust_outliers();
+  Status distrust_outliers(const DescentLimits& limits);
   // PriorStrengths::fit and refit for the present linear model.
   Status fit();
   Result<bool> refit(bool may_change);

@@ -133,7 +133,7 @@ void judge_algorithm(const Estimate& estimate, Judge& judge) {
 void judge_data(const Estimate& estimate, Judge& judge) {
   if (estimate.region_known < kLeastKnown) {
     judge.set(QualityFlag::kMostlyPrior,
-              "%.0f %% of its variance before the data, at least %.0f %%",
+              "%.0f %% of its standard deviation before the data, at least %.0f %%",
               100.0 * estimate.region_known, 100.0 * kLeastKnown);
   }
   if (estimate.misfit_ratio > kUnexplainedMisfit) {

@@ -114,10 +114,15 @@ std::array<int, kRemainders> kept_modes(const CaseConfig& config, int loads, Eig
 
 // The leading modes of F with F = C Omega: F V Lambda^-1/2 with Omega^T F = V Lambda V^T. At most
 // `kept`. sketch, modes: a field per row.
-Result<MatrixXd> leading_modes(const TestVectors& omega, const MatrixXd& sketch, int kept) {
-  const Eigen::Index tested = sketch.rows();
-  MatrixXd core(tested, tested);
-  linalg::blas::multiply_by_transposed(1.0, omega.numbers, omega.columns_of(sketch), 0.0, core);
+// Of several processes each has its own rows of the sketch.
+Result<MatrixXd> leading_modes(const TestVectors& omega, const MatrixXd& sketch, int kept,
+                               const BlockRunner& runner) {
+  const Eigen::Index tested = omega.numbers.rows();
+  const Eigen::Index first = runner.own_first(static_cast<int>(tested));
+  MatrixXd core = MatrixXd::Zero(tested, tested);
+  linalg::blas::multiply_by_transposed(1.0, omega.numbers, omega.columns_of(sketch), 0.0,
+                                       core.middleCols(first, sketch.rows()));
+  runner.sum(core);
   core = (0.5 * (core + core.transpose())).eval();
   const Eigen::SelfAdjointEigenSolver<MatrixXd> eigen(core);
   if (eigen.info() != Eigen::Success || !eigen.eigenvalues().allFinite()) {
@@ -130,13 +135,22 @@ Result<MatrixXd> leading_modes(const TestVectors& omega, const MatrixXd& sketch,
          eigen.eigenvalues()[tested - 1 - rank] > smallest) {
     ++rank;
   }
+  // The first process chooses: another processor may find other signs, or another noise.
+  const bool chooses = runner.ranks() == nullptr || runner.ranks()->rank() == 0;
+  VecX chosen = VecX::Constant(1, chooses ? static_cast<double>(rank) : 0.0);
+  runner.sum(chosen);
+  rank = static_cast<Eigen::Index>(chosen[0]);
   MatrixXd scaled(tested, rank);
   for (Eigen::Index j = 0; j < rank; ++j) {
     scaled.col(j) =
         eigen.eigenvectors().col(tested - 1 - j) / std::sqrt(eigen.eigenvalues()[tested - 1 - j]);
   }
+  if (!chooses) scaled.setZero();
+  runner.sum(scaled);
   MatrixXd modes(rank, sketch.cols());
-  linalg::blas::multiply_transposed(1.0, scaled, sketch, 0.0, modes);
+  linalg::blas::multiply_transposed(1.0, scaled.middleRows(first, sketch.rows()), sketch, 0.0,
+                                    modes);
+  runner.sum(modes);
   return modes;
 }
 
@@ -181,7 +195,7 @@ Status prior_modes(const PreparedModel& model, BlockRunner& runner, MatrixXf& mo
       tested_for(*std::max_element(kept.begin(), kept.begin() + kFarField), kOversampling);
   const int tested_far = kept[kFarField] > 0 ? tested_for(kept[kFarField], kOversamplingFar) : 0;
 
-  MatrixXd load_modes(loads, rows);
+  MatrixXd load_modes = MatrixXd::Zero(loads, rows);
   auto status = runner.run("load modes", loads, [&](int first, int count, auto& own) -> Status {
     own.loads = prior.modes().middleCols(first, count).transpose();
     if (auto solved = own.solver.solve(own.loads, own.solved); !solved) return solved;
@@ -189,6 +203,7 @@ Status prior_modes(const PreparedModel& model, BlockRunner& runner, MatrixXf& mo
     return {};
   });
   if (!status) return status;
+  runner.sum(load_modes);
   append_modes(load_modes, modes, result);
   load_modes.resize(0, 0);
 
@@ -198,12 +213,16 @@ Status prior_modes(const PreparedModel& model, BlockRunner& runner, MatrixXf& mo
   const TestVectors omega_far = test_vectors(result, everywhere, tested_far);
   std::array<MatrixXd, kRemainders> sketches;
   for (std::size_t g = 0; g < kept.size(); ++g) {
-    if (kept[g] > 0) sketches[g].resize(g == kFarField ? tested_far : tested, rows);
+    if (kept[g] > 0) {
+      sketches[g].resize(runner.own_count(g == kFarField ? tested_far : tested), rows);
+    }
   }
   const auto sketch = [&](std::size_t g, int first, int count, auto& own) -> Status {
-    prior.kernel(static_cast<int>(g)).apply(own.solved, own.loads);
+    own.loads.resize(count, rows);
+    if (count > 0) prior.kernel(static_cast<int>(g)).apply(own.solved, own.loads);
     if (auto solved = own.solver.solve(own.loads, own.loads); !solved) return solved;
-    sketches[g].middleRows(first, count) = own.loads;
+    const int before = runner.own_first(g == kFarField ? tested_far : tested);
+    sketches[g].middleRows(first - before, count) = own.loads;
     return {};
   };
   status = runner.run("prior modes", tested, [&](int first, int count, auto& own) -> Status {
@@ -226,7 +245,8 @@ Status prior_modes(const PreparedModel& model, BlockRunner& runner, MatrixXf& mo
   result.part_columns = prior.columns_of_part();
   for (std::size_t g = 0; g < kept.size(); ++g) {
     if (kept[g] == 0) continue;
-    const auto leading = leading_modes(g == kFarField ? omega_far : omega, sketches[g], kept[g]);
+    const auto leading =
+        leading_modes(g == kFarField ? omega_far : omega, sketches[g], kept[g], runner);
     if (!leading) return tl::unexpected(leading.error());
     sketches[g].resize(0, 0);
     result.part_columns[kLoadParts + g] = static_cast<int>(leading->rows());
@@ -263,12 +283,13 @@ Status left_out_variance(const PreparedModel& model, BlockRunner& runner, const 
         }
         if (auto solved = own.solver.solve(own.loads, own.solved); !solved) return solved;
         for (int g = 0; g < kRemainders; ++g) {
-          if (result.columns(static_cast<PriorPart>(kLoadParts + g)) == 0) continue;  // is off
+          if (count == 0 || result.columns(static_cast<PriorPart>(kLoadParts + g)) == 0) continue;
           variance.col(g).segment(first, count) =
               model.prior().kernel(g).variance_along(own.solved);
         }
         return {};
       });
+  runner.sum(variance);
   Points positions(3, probed);
   MatrixXd left_out(probed, kRemainders);
   for (int i = 0; i < probed; ++i) {
@@ -350,6 +371,7 @@ struct Solved {
   SpatialBlocks nodes;
   MatrixXf modes;
   ContactColumns contact;
+  Ranks* ranks = nullptr;
 };
 
 int threads_of(const CondenseOptions& options) {
@@ -362,6 +384,7 @@ Result<Solved> solve(const PreparedModel& model, const CondenseOptions& options,
   sizes.nodes = model.model().mesh.num_nodes();
   sizes.slaves = model.forward().contact().num_slaves();
   Solved solved;
+  solved.ranks = model.ranks();
   CondensedOperators& result = solved.operators;
   result.boundary = model.boundary();
   result.model_id = model.model().model_id;
@@ -370,13 +393,14 @@ Result<Solved> solve(const PreparedModel& model, const CondenseOptions& options,
   sizes.modes = model.config().condensed.max_rank;
   sizes.threads = threads_of(options);
   sizes.model_bytes = model.timings().bytes;
+  sizes.ranks = model.ranks() != nullptr ? model.ranks()->size() : 1;
   sizes.model_stays = !free_model;
   sizes.columns_in_memory = !options.store.keeps();
-  if (auto status = check_memory(model, condense_memory_bytes(sizes)); !status) {
-    return tl::unexpected(status.error());
+  BlockRunner runner(model, options.progress, options.stop, options.threads);
+  if (auto ok = runner.agree(check_memory(model, condense_memory_bytes(sizes))); !ok) {
+    return tl::unexpected(ok.error());
   }
   solved.nodes = node_blocks(model.model().mesh.nodes);
-  BlockRunner runner(model, options.progress, options.stop, options.threads);
   add_slaves(model, result);
   // The modes first: the test vectors are gone before the first column is there.
   if (auto status = prior_modes(model, runner, solved.modes, result); !status) {
@@ -397,16 +421,20 @@ Result<CondensedOperators> make_compact(Result<Solved> solved, const CondenseOpt
   CondensedOperators& result = solved->operators;
   const Eigen::Index modes = solved->modes.cols();
   const auto slaves = static_cast<Eigen::Index>(result.slaves.size());
-  result.region_responses.resize(3 * static_cast<Eigen::Index>(result.region.size()),
-                                 modes + slaves);
-  ThreadTeam team(options.threads);
+  result.region_responses.setZero(3 * static_cast<Eigen::Index>(result.region.size()),
+                                  modes + slaves);
+  ThreadTeam team(solved->ranks != nullptr ? 1 : options.threads);
   auto responses =
       encode_columns(solved->nodes,
                      {keeping_region(group_of(solved->modes, kModeStep), 0, result),
                       keeping_region(solved->contact.group(kContactStep), modes, result)},
-                     team, options.progress, options.stop);
+                     team, options.progress, options.stop, solved->ranks);
   if (!responses) return tl::unexpected(responses.error());
   result.responses = std::move(*responses);
+  if (solved->ranks != nullptr) {
+    auto& rows = result.region_responses;
+    solved->ranks->sum(std::span(rows.data(), static_cast<std::size_t>(rows.size())));
+  }
   return std::move(result);
 }
 
@@ -416,12 +444,13 @@ std::uint64_t condense_memory_bytes(const CondenseSizes& sizes) {
   const auto of = [](int count) { return static_cast<std::uint64_t>(count); };
   const std::uint64_t rows = 3 * of(sizes.nodes), s = of(sizes.slaves), m = of(sizes.modes);
   const std::uint64_t tested = m / 2 + kOversampling;
-  const std::uint64_t columns = sizes.columns_in_memory ? 4 * rows * s : 0;
+  const std::uint64_t ranks = of(sizes.ranks);
+  const std::uint64_t columns = sizes.columns_in_memory ? 4 * rows * s / ranks : 0;
   // Two matrices of a member, three of its solver.
   const std::uint64_t blocks = 5 * 8 * rows * kBlock * of(sizes.threads);
   const std::uint64_t modes = 4 * rows * m, compliance = 8 * s * s;
   // Three residual fields, as the default case has them; the fourth is rare.
-  const std::uint64_t sketches = 8 * tested * (3 * rows + 3 * (of(sizes.region) + s));
+  const std::uint64_t sketches = 8 * tested * (3 * rows / ranks + 3 * (of(sizes.region) + s));
   const std::uint64_t solving =
       sizes.model_bytes + modes + blocks + std::max(sketches, compliance + columns);
   // Compact columns take less than half of single precision, and are there twice when joined.

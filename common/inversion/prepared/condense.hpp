@@ -12,6 +12,9 @@
 //   4. G = K^-1 N block by block; Phi from the same blocks (contact_columns.hpp)
 //   5. [U G] made small (encode_columns.hpp)
 // With a store on disk G is in memory by blocks only; and the sketches of step 2 are gone by then.
+//
+// By several processes (PreparedModel::ranks) each has its own columns in the steps 1 to 4, and its
+// own node blocks in step 5. The result is whole in the first process; the others lack `responses`.
 #pragma once
 
 #include <cstdint>
@@ -47,12 +50,12 @@ Result<CondensedOperators> condense(const PreparedModel& model,
 Result<CondensedOperators> condense(PreparedModel&& model, const CondenseOptions& options = {});
 
 struct CondenseSizes {
-  int nodes = 0, slaves = 0, region = 0, modes = 0, threads = 1;
+  int nodes = 0, slaves = 0, region = 0, modes = 0, threads = 1, ranks = 1;
   std::uint64_t model_bytes = 0;  // PrepareTimings::bytes
   bool model_stays = true;        // during step 5
   bool columns_in_memory = true;
 };
-// Peak memory of condense() and of its model, bytes.
+// Peak memory of condense() and of its model, bytes; of the first process where there are several.
 std::uint64_t condense_memory_bytes(const CondenseSizes& sizes);
 
 // The largest standard deviation of a node's motion under the prior, mm: root of the sum over its

@@ -2,7 +2,10 @@
 #include "common/inversion/prepared/contact_columns.hpp"
 
 #include <cmath>
+#include <cstring>
+#include <limits>
 #include <mutex>
+#include <optional>
 #include <utility>
 
 namespace brainshift::inversion {
@@ -10,14 +13,6 @@ namespace {
 
 using Eigen::MatrixXd;
 using Eigen::MatrixXf;
-
-// How the slaves are dealt.
-struct Blocks {
-  int size, count;
-  explicit Blocks(std::size_t slaves)
-      : size(BlockRunner::block_size(static_cast<int>(slaves))),
-        count((static_cast<int>(slaves) + size - 1) / size) {}
-};
 
 Points slave_positions(const PreparedModel& model, const CondensedOperators& result) {
   Points positions(3, static_cast<Eigen::Index>(result.slaves.size()));
@@ -34,6 +29,45 @@ void sort_nodes(const MatrixXd& u, const SpatialBlocks& nodes, MatrixXf& sorted)
         u.middleCols<3>(3L * nodes.order[i]).cast<float>();
   }
 }
+
+// What the processes have to do with each other's columns: `rows` at the nodes of each one's part.
+class Exchange {
+ public:
+  Exchange(Ranks& ranks, const SpatialBlocks& nodes) : ranks_(ranks), nodes_(nodes) {}
+
+  // Places of the nodes of process r.
+  Eigen::Index first(int r) const {
+    return nodes_.first[static_cast<std::size_t>(ranks_.first(r, nodes_.size()))];
+  }
+  // index: of the own block, -1 none. -> those of all processes, at the own nodes.
+  std::vector<std::pair<int, MatrixXf>> operator()(int index, const MatrixXf& rows) const {
+    std::vector<Ranks::Bytes> messages(static_cast<std::size_t>(ranks_.size()));
+    for (int r = 0; index >= 0 && r < ranks_.size(); ++r) {
+      const auto part = rows.middleCols(3 * first(r), 3 * (first(r + 1) - first(r)));
+      const auto bytes = static_cast<std::size_t>(part.size()) * sizeof(float);
+      Ranks::Bytes& message = messages[static_cast<std::size_t>(r)];
+      message.resize(sizeof(int) + bytes);
+      std::memcpy(message.data(), &index, sizeof(int));
+      if (bytes > 0) std::memcpy(message.data() + sizeof(int), part.data(), bytes);
+    }
+    std::vector<std::pair<int, MatrixXf>> blocks;
+    const Eigen::Index columns = 3 * (first(ranks_.rank() + 1) - first(ranks_.rank()));
+    for (const Ranks::Bytes& message : ranks_.exchange(std::move(messages))) {
+      if (message.empty()) continue;
+      const std::size_t bytes = message.size() - sizeof(int);
+      auto& [of, part] = blocks.emplace_back();
+      std::memcpy(&of, message.data(), sizeof(int));
+      if (bytes == 0) continue;
+      part.resize(static_cast<Eigen::Index>(bytes / sizeof(float)) / columns, columns);
+      std::memcpy(part.data(), message.data() + sizeof(int), bytes);
+    }
+    return blocks;
+  }
+
+ private:
+  Ranks& ranks_;
+  const SpatialBlocks& nodes_;
+};
 
 // Phi's columns of the slaves that have the responses u, k x 3n.
 void compliance_of(const MatrixXd& u, const CondensedOperators& operators, MatrixXd& compliance) {
@@ -76,13 +110,11 @@ ColumnGroup ContactColumns::group(float step) const {
   group.greatest = greatest;
   group.rows = [this](std::span<const NodeIndex>, Eigen::Index place, MatrixXf& out) -> Status {
     MatrixXf part;
-    const Blocks blocks(order.size());
-    for (int block = 0; block < blocks.count; ++block) {
-      const auto slaves =
-          std::span(order).subspan(static_cast<std::size_t>(Eigen::Index{block} * blocks.size));
-      part.resize(std::min<Eigen::Index>(blocks.size, static_cast<Eigen::Index>(slaves.size())),
+    for (int block = 0; block * block_size < static_cast<int>(order.size()); ++block) {
+      const auto slaves = std::span(order).subspan(static_cast<std::size_t>(block * block_size));
+      part.resize(std::min<Eigen::Index>(block_size, static_cast<Eigen::Index>(slaves.size())),
                   out.rows());
-      if (auto status = store.read(block, 3 * place, part); !status) return status;
+      if (auto status = store.read(block, 3 * (place - first_place), part); !status) return status;
       for (Eigen::Index j = 0; j < part.rows(); ++j) {
         out.col(slaves[static_cast<std::size_t>(j)]) = part.row(j).transpose();
       }
@@ -110,11 +142,17 @@ Result<ContactColumns> solve_contact_columns(const PreparedModel& model, const S
                                              CondensedOperators& result) {
   const auto s = static_cast<Eigen::Index>(result.slaves.size());
   const Eigen::Index rows = 3 * model.model().mesh.num_nodes();
-  const Blocks blocks(result.slaves.size());
   ContactColumns columns;
-  columns.order = spatial_blocks(slave_positions(model, result), blocks.size).order;
-  columns.store = store.keeps() ? std::move(store) : memory_store(blocks.count);
-  result.compliance.resize(s, s);
+  columns.block_size = BlockRunner::block_size(static_cast<int>(s), runner.ranks());
+  columns.order = spatial_blocks(slave_positions(model, result), columns.block_size).order;
+  const int size = columns.block_size, blocks = (static_cast<int>(s) + size - 1) / size;
+  columns.store = store.keeps() ? std::move(store) : memory_store(blocks);
+  result.compliance.setZero(s, s);
+  std::optional<Exchange> exchange;
+  if (runner.ranks() != nullptr) {
+    exchange.emplace(*runner.ranks(), nodes);
+    columns.first_place = exchange->first(runner.ranks()->rank());
+  }
   std::mutex mutex;  // of the store, the greatest number and what was not finite
   bool finite = true;
   const auto work = [&](int first, int count, BlockRunner::Member& own) -> Status {
@@ -126,7 +164,7 @@ Result<ContactColumns> solve_contact_columns(const PreparedModel& model, const S
     bool kept = false;
     {
       const std::lock_guard lock(mutex);
-      kept = columns.store.load(first / blocks.size, sorted, compliance);
+      kept = !exchange && columns.store.load(first / size, sorted, compliance);
     }
     if (!kept) {
       own.loads.setZero(count, rows);
@@ -139,19 +177,32 @@ Result<ContactColumns> solve_contact_columns(const PreparedModel& model, const S
       sort_nodes(own.solved, nodes, sorted);
     }
     const float greatest = greatest_of(sorted);
+    if (exchange) {
+      for (const auto& [index, part] : (*exchange)(count > 0 ? first / size : -1, sorted)) {
+        if (auto saved = columns.store.save(index, part, {}); !saved) return saved;
+      }
+      kept = true;
+    }
     for (int j = 0; j < count; ++j) result.compliance.col(slave(j)) = compliance.col(j);
     const std::lock_guard lock(mutex);
     finite = finite && std::isfinite(greatest) && compliance.allFinite();
     columns.greatest = std::max(columns.greatest, greatest);
-    return kept ? Status{} : columns.store.save(first / blocks.size, sorted, compliance);
+    return kept ? Status{} : columns.store.save(first / size, sorted, compliance);
   };
   if (auto status = runner.run("contact columns", static_cast<int>(s), work); !status) {
     return tl::unexpected(status.error());
   }
-  if (!finite) {
+  // One figure of each process, and all can be read everywhere.
+  std::vector<float> all(exchange ? static_cast<std::size_t>(runner.ranks()->size()) : 1U);
+  all[exchange ? static_cast<std::size_t>(runner.ranks()->rank()) : 0U] =
+      finite ? columns.greatest : std::numeric_limits<float>::infinity();
+  runner.sum(all);
+  columns.greatest = *std::max_element(all.begin(), all.end());
+  if (!std::isfinite(columns.greatest)) {
     return fail(ErrorCode::kNotFinite,
                 "contact columns: the compliance of the slaves is not finite");
   }
+  runner.sum(result.compliance);
   make_symmetric(result.compliance);
   return columns;
 }

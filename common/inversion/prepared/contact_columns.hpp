@@ -27,6 +27,10 @@ namespace brainshift::inversion {
 // BlockRunner: work on many columns, in blocks dealt to the cores in a fixed partition; every core
 // has its own solver. What a block gives does not depend on the core that worked on it: results are
 // bit-identical for any number of threads, as long as blocks write to different places.
+//
+// By several processes (PreparedModel::ranks): consecutive blocks are one process's own, and each
+// has one thread, since a solve is made by all of them. Each works on as many blocks as the others,
+// with none of its columns where it has fewer: `work` then solves all the same.
 class BlockRunner {
  public:
   // Right-hand sides per block at most: from here on a solve is bound by arithmetic, no longer by
@@ -35,9 +39,19 @@ class BlockRunner {
   // Columns of each block but the last, which may have fewer. An even number of blocks of the same
   // size, so that two or four cores end at the same time; whatever their number is, since a block's
   // numbers depend on its size in their last bits.
-  static int block_size(int columns) {
-    const int pairs = std::max(1, (columns + 2 * kBlock - 1) / (2 * kBlock));
-    return std::max(1, (columns + 2 * pairs - 1) / (2 * pairs));
+  static int block_size(int columns, const Ranks* ranks = nullptr) {
+    const int together = ranks == nullptr ? 2 : ranks->size();
+    const int most = together * (ranks == nullptr ? kBlock : kSharedBlock);
+    const int rounds = std::max(1, (columns + most - 1) / most);
+    return std::max(1, (columns + together * rounds - 1) / (together * rounds));
+  }
+  // Of several processes: each has that many of its own, and its part of everybody's.
+  static constexpr int kSharedBlock = 24;
+
+  // The own columns are [own_first(columns), own_first(columns) + own_count(columns)).
+  int own_first(int columns) const { return std::min(columns, part(columns, rank())); }
+  int own_count(int columns) const {
+    return std::min(columns, part(columns, rank() + 1)) - own_first(columns);
   }
 
   // What one core works with. The matrices are for `work` below to use as it likes, with a field
@@ -49,7 +63,10 @@ class BlockRunner {
 
   // Keeps a reference to the model. threads: 0 means as many as cores.
   BlockRunner(const PreparedModel& model, Progress progress, std::stop_token stop, int threads)
-      : team_(threads), progress_(std::move(progress)), stop_(std::move(stop)) {
+      : ranks_(model.ranks()),
+        team_(ranks_ != nullptr ? 1 : threads),
+        progress_(std::move(progress)),
+        stop_(std::move(stop)) {
     for (int i = 0; i < team_.size(); ++i) {
       members_.push_back(std::make_unique<Member>(
           Member{{model.forward().stiffness(), model.forward().factor(), model.forward().dofs()},
@@ -62,6 +79,7 @@ class BlockRunner {
   // stopped; else the error of a block, after which no other is begun.
   template <typename Work>
   Status run(std::string_view stage, int columns, const Work& work) {
+    if (ranks_ != nullptr) return run_together(stage, columns, work);
     const int size = block_size(columns), blocks = (columns + size - 1) / size;
     std::atomic<int> done{0};
     std::atomic<bool> failed{false};
@@ -91,7 +109,45 @@ class BlockRunner {
     return {};
   }
 
+  Ranks* ranks() const { return ranks_; }
+  // Sums over the processes, in place.
+  template <typename Matrix>
+  void sum(Matrix& numbers) const {
+    if (ranks_ != nullptr) {
+      ranks_->sum(std::span(numbers.data(), static_cast<std::size_t>(numbers.size())));
+    }
+  }
+  // The first error that a process has.
+  Status agree(const Status& own) const { return ranks_ != nullptr ? ranks_->agree(own) : own; }
+
  private:
+  int rank() const { return ranks_ != nullptr ? ranks_->rank() : 0; }
+  int rounds(int columns) const {
+    const int each = block_size(columns, ranks_) * ranks_->size();
+    return (columns + each - 1) / each;
+  }
+  // The first column of process r.
+  int part(int columns, int r) const {
+    return ranks_ == nullptr ? r * columns : r * rounds(columns) * block_size(columns, ranks_);
+  }
+  template <typename Work>
+  Status run_together(std::string_view stage, int columns, const Work& work) {
+    const int size = block_size(columns, ranks_), all = rounds(columns);
+    const int first = own_first(columns), end = first + own_count(columns);
+    report(progress_, stage, 0.0);
+    for (int round = 0; round < all; ++round) {
+      const int at = std::min(end, first + round * size);
+      Status status = work(at, std::min(size, end - at), *members_.front());
+      if (status && stop_.stop_requested()) {
+        status = fail(ErrorCode::kUnavailable, "preparation was stopped");
+      }
+      if (status = agree(status); !status) return status;
+      report(progress_, stage, static_cast<double>(round + 1) / all);
+    }
+    return {};
+  }
+
+  Ranks* ranks_;
   ThreadTeam team_;
   Progress progress_;
   std::stop_token stop_;
@@ -113,7 +169,9 @@ struct BlockStore {
   bool keeps() const { return static_cast<bool>(save); }
 };
 struct ContactColumns {
-  std::vector<int> order;  // of the slaves, block after block of BlockRunner::block_size()
+  std::vector<int> order;        // of the slaves, block after block
+  int block_size = 1;            // BlockRunner::block_size()
+  Eigen::Index first_place = 0;  // the store's rows begin with this node of node_blocks()
   BlockStore store;
   float greatest = 0.0F;
 
@@ -126,6 +184,8 @@ void add_slaves(const PreparedModel& model, CondensedOperators& result);
 
 // Fills compliance; after add_slaves(). nodes: node_blocks() of the mesh. store: that of the
 // columns, or one that keeps nothing: then they stay in memory. progress: stage "contact columns".
+// By several processes: each keeps all columns, at the nodes of its own part of the blocks
+// (Ranks::first) alone.
 // Errors of the runner and of the store; kNotFinite.
 Result<ContactColumns> solve_contact_columns(const PreparedModel& model, const SpatialBlocks& nodes,
                                              BlockStore store, BlockRunner& runner,

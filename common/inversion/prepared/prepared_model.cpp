@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "common/inversion/prepared/prepared_model.hpp"
 
+#include <fmt/format.h>
+
 #include <Eigen/Geometry>
 
 #include <future>
@@ -10,6 +12,7 @@
 #include "common/core/units.hpp"
 #include "common/geometry/closest_point.hpp"
 #include "common/linalg/openblas.hpp"
+#include "common/operators/encode_columns.hpp"
 
 namespace brainshift::inversion {
 namespace {
@@ -48,6 +51,22 @@ prior::ForcePrior build_prior(const BrainModel& model, const PriorConfig& config
       std::move(modes));
 }
 
+// Which process's each node is: neighbours together, about as many for each.
+Result<contact::SharedNodes> share_nodes(const TetMesh& mesh, Ranks* ranks) {
+  if (ranks == nullptr) return contact::SharedNodes{};
+  const int each = (mesh.num_nodes() + ranks->size() - 1) / ranks->size();
+  const SpatialBlocks blocks = spatial_blocks(mesh.nodes, each);
+  if (blocks.size() != ranks->size()) {
+    return invalid(fmt::format("{} processes: a mesh of {} nodes is cut into {} parts",
+                               ranks->size(), mesh.num_nodes(), blocks.size()));
+  }
+  contact::SharedNodes shared{ranks, std::vector<int>(static_cast<std::size_t>(mesh.num_nodes()))};
+  for (int b = 0; b < blocks.size(); ++b) {
+    for (const int node : blocks.block(b)) shared.part[static_cast<std::size_t>(node)] = b;
+  }
+  return shared;
+}
+
 }  // namespace
 
 prior::ForcePrior scaled_prior(const PreparedModel& model, const PriorScaleValues& scales) {
@@ -71,9 +90,12 @@ PreparedModel::PreparedModel(std::shared_ptr<const BrainModel> model, CaseConfig
 Result<PreparedModel> PreparedModel::prepare(std::shared_ptr<const BrainModel> model,
                                              const CaseConfig& config, Boundary boundary,
                                              const Progress& progress,
-                                             std::shared_ptr<const prior::ForcePrior> prior) {
+                                             std::shared_ptr<const prior::ForcePrior> prior,
+                                             Ranks* ranks) {
   const Stopwatch whole;
   linalg::use_single_threaded_blas();
+  const auto shared = share_nodes(model->mesh, ranks);
+  if (!shared) return tl::unexpected(shared.error());
   double prior_s = 0.0;
   std::future<Status> made;
   if (!prior) {
@@ -87,7 +109,7 @@ Result<PreparedModel> PreparedModel::prepare(std::shared_ptr<const BrainModel> m
       return {};
     });
   }
-  auto forward = contact::ForwardModel::build(*model, config, boundary, progress);
+  auto forward = contact::ForwardModel::build(*model, config, boundary, progress, *shared);
   if (made.valid()) {
     report(progress, "prior", 0.0);
     const Status status = made.get();
@@ -96,6 +118,7 @@ Result<PreparedModel> PreparedModel::prepare(std::shared_ptr<const BrainModel> m
   if (!forward) return tl::unexpected(forward.error());
 
   PreparedModel prepared = of(std::move(model), config, std::move(*forward), std::move(prior));
+  prepared.ranks_ = ranks;
   prepared.timings_.prior_s = prior_s;
   prepared.timings_.total_s = whole.seconds();
   report(progress, "ready", 1.0);

@@ -35,11 +35,13 @@ class PreparedModel {
  public:
   // kFloatingBody, kSingularMatrix, kEmptySet or kNotFinite names the cause. prior: of the same
   // model and case, under another boundary (it does not depend on that); else it is made, while
-  // the stiffness matrix is factorised.
+  // the stiffness matrix is factorised. ranks: processes that do the same and share the factor;
+  // kInvalidArgument when they are more than the mesh can be cut into.
   static Result<PreparedModel> prepare(std::shared_ptr<const BrainModel> model,
                                        const CaseConfig& config, Boundary boundary,
                                        const Progress& progress = {},
-                                       std::shared_ptr<const prior::ForcePrior> prior = nullptr);
+                                       std::shared_ptr<const prior::ForcePrior> prior = nullptr,
+                                       Ranks* ranks = nullptr);
 
   // The same from a forward model and a prior that were made elsewhere.
   static PreparedModel of(std::shared_ptr<const BrainModel> model, const CaseConfig& config,
@@ -54,6 +56,7 @@ class PreparedModel {
   const prior::ForcePrior& prior() const { return *prior_; }
   std::shared_ptr<const prior::ForcePrior> shared_prior() const { return prior_; }
   const geometry::TetLocator& locator() const { return locator_; }
+  Ranks* ranks() const { return ranks_; }  // nullptr: this process alone
 
  private:
   PreparedModel(std::shared_ptr<const BrainModel> model, CaseConfig config,
@@ -64,6 +67,7 @@ class PreparedModel {
   std::shared_ptr<const prior::ForcePrior> prior_;
   geometry::TetLocator locator_;
   PrepareTimings timings_;
+  Ranks* ranks_ = nullptr;
 };
 
 // The case's prior with the standard deviations of its parts multiplied by `scales`.

@@ -66,7 +66,7 @@ void ContactAtLoads::begin_from(const std::vector<int>& slaves,
   }
 }
 
-Status ContactAtLoads::solve(const VecX& z) {
+Result<bool> ContactAtLoads::solve(const VecX& z, const std::function<bool()>& give_up) {
   const auto modes = operators_.slave_modes.middleCols(window_.first, window_.count);
   team_.split(free_penetration_.size(), [&](long begin, long end) {
     free_penetration_.segment(begin, end - begin).noalias() =
@@ -77,15 +77,16 @@ Status ContactAtLoads::solve(const VecX& z) {
   violation_mm_ = 0.0;
   if (!contact_) {
     penetration_ = free_penetration_;
-    return {};
+    return true;
   }
   begin_set();
   all_forces_.setZero();
   double value = std::numeric_limits<double>::infinity();
   while (sets_ < kMaxSets) {
+    if (give_up && give_up()) return false;
     ++sets_;
     list_active(set_, active_);
-    if (auto status = system_.take(set_); !status) return status;
+    if (auto status = system_.take(set_); !status) return tl::unexpected(status.error());
     system_.solve(z, free_penetration_, forces_.head(size()), newton_penetration_);
     const bool all_press = size() == 0 || forces_.head(size()).minCoeff() >= 0.0;
     violation_mm_ = 0.0;
@@ -108,7 +109,7 @@ Status ContactAtLoads::solve(const VecX& z) {
       value = now;
       break;
     }
-    if (solved) return {};
+    if (solved) return true;
     follow();
   }
   return fail(ErrorCode::kNotConverged,

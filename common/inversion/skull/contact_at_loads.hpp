@@ -15,6 +15,7 @@
 // construction, but for what that makes once.
 #pragma once
 
+#include <functional>
 #include <vector>
 
 #include "common/contact/penalty.hpp"
@@ -37,9 +38,10 @@ class ContactAtLoads {
 
   // The next search begins from these forces of these slaves, N; where they pull, from 0.
   void begin_from(const std::vector<int>& slaves, const Eigen::Ref<const VecX>& forces);
-  // Solves for z from the last forces on, or from those of begin_from(). kNotConverged after
-  // kMaxSets sets; errors of ContactSystem::take.
-  Status solve(const VecX& z);
+  // Solves for z from the last forces on, or from those of begin_from(). give_up: asked before
+  // every set. false when it said so: there is no solution then until the next solve() or
+  // return_to_kept(). kNotConverged after kMaxSets sets; errors of ContactSystem::take.
+  Result<bool> solve(const VecX& z, const std::function<bool()>& give_up = {});
   // out += T^T felt with T of the present set (contact_system.hpp): what forces felt by data mean
   // for the modes. felt: one per active slave; out: r.
   Status add_adjoint(const Eigen::Ref<const VecX>& felt, VecX& out);

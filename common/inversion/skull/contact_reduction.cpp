@@ -143,13 +143,19 @@ double ContactReach::along(const VecX& step, const VecX& penetration, int most) 
   const auto modes = operators_.slave_modes.middleCols(window_.first, window_.count);
   team_.split(closing_.size(), [&](long begin, long end) {
     closing_.segment(begin, end - begin).noalias() = -modes.middleRows(begin, end - begin) * step;
-    for (int j = 0; j < k; ++j) {
-      linalg::blas::add_scaled(
-          end - begin, -opening[j],
-          operators_.compliance.col(active[static_cast<std::size_t>(j)]).data() + begin,
-          closing_.data() + begin);
-    }
   });
+  if (2 * k <= operators_.num_slaves()) {
+    subtract_penetration(operators_, active, opening, team_, closing_);
+  } else {  // of few open slaves each is the product of one column, because Phi is symmetric
+    crossings_.setZero();
+    for (int j = 0; j < k; ++j) crossings_[active[static_cast<std::size_t>(j)]] = opening[j];
+    team_.split(closing_.size(), [&](long begin, long end) {
+      for (long slave = begin; slave < end; ++slave) {
+        if (reduction_.set()[static_cast<std::size_t>(slave)]) continue;
+        closing_[slave] -= operators_.compliance.col(slave).dot(crossings_);
+      }
+    });
+  }
   int count = 0;
   const auto cross = [&](double margin, double speed) {
     if (margin >= 0.0 && margin < speed) crossings_[count++] = margin / speed;

@@ -70,8 +70,6 @@ class ContactReduction {
   VecX penetration_change(const VecX& dg, const VecX& dz, const VecX& df) const;
 
  private:
-  // A set that follows the one before: by at most so many changes, and this part of its slaves.
-
   Eigen::Map<const Eigen::MatrixXd> response_of(const Eigen::MatrixXd& storage, int size) const {
     return {storage.data(), size, window_.count + 1};
   }
@@ -124,7 +122,7 @@ class ContactReach {
   const ContactReduction& reduction_;
   ThreadTeam& team_;
   VecX opening_, closing_;  // changes of force, N, and of penetration, mm
-  VecX crossings_;          // values of t
+  VecX crossings_;          // values of t; before them forces of all slaves, N
 };
 
 }  // namespace brainshift::inversion

@@ -29,10 +29,10 @@
 //
 // What the data cannot see keeps its prior. Data near the tumour say that a part is absent *there*,
 // and would switch it off everywhere; two things stand against that. No data choose the strength of
-// the far part (PriorPart::kFar): it is the root mean square of the prior above, 1.7, or that of
-// the medium and coarse fields where it is greater. And the *broad hypothesis*, that every part is
-// as strong as before the data, or as the held one has it where that is more, has a weight of its
-// own that no data change (PriorConfig::broad_weight); it comes last.
+// the far part (PriorPart::kFar): it is the root mean square of the prior above without s_g = 0,
+// 2.4, or that of the medium and coarse fields where it is greater. And the *broad hypothesis*,
+// that every part is as strong as that, or as the held one has it where that is more, has a weight
+// of its own that no data change (PriorConfig::broad_weight); it comes last.
 //
 // The result depends on G and b alone, not on earlier updates. Neighbours are weighed by all
 // threads of the team, each by one of them. Allocates nothing after construction but when more

@@ -10,6 +10,7 @@
 #include "common/io/config/key_reader.hpp"
 #include "common/io/files/file_access.hpp"
 #include "common/io/geometry/label_map_file.hpp"
+#include "common/io/geometry/label_names.hpp"
 #include "common/io/geometry/mesh_file.hpp"
 
 namespace brainshift::io {
@@ -166,6 +167,12 @@ Result<CaseInputs> load_case_inputs(const CaseConfig& config) {
   }
   if (config.contact.skull_file) {
     loader.load(*config.contact.skull_file, read_surface, inputs.skull);
+  }
+  if (config.anatomy.labels) {
+    loader.load(*config.anatomy.labels, read_volume, inputs.labels);
+    std::optional<LabelNames> names;
+    loader.load(*config.anatomy.labels, label_names_beside, names);
+    if (names) inputs.label_names = std::move(*names);
   }
   if (!loader.status()) return tl::unexpected(loader.status().error());
   return inputs;

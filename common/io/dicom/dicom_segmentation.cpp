@@ -24,6 +24,7 @@ constexpr int kMaxSegVoxelsAlong = 32767;
 
 struct Frame {
   ImagePlane plane;
+  std::size_t number = 0;  // from 0, as it lies in the file
   int segment = 0;
   double thickness = 0.0, depth = 0.0;
 };
@@ -109,22 +110,29 @@ Result<double> slice_step_of(std::vector<Frame>& frames) {
   return step;
 }
 
-Result<DicomSegmentation> parse_segmentation(DcmDataset& data) {
-  if (text_of(data, DCM_SOPClassUID) != UID_SegmentationStorage) {
-    return unreadable("is DICOM, but no segmentation (SEG)");
-  }
-  DicomSegmentation result;
-  for (Sint32 i = 0; DcmItem* const item = item_of(&data, DCM_SegmentSequence, i); ++i) {
-    Uint16 number = 0;
-    item->findAndGetUint16(DCM_SegmentNumber, number);
-    result.names[number] = to_utf8(text_of(*item, DCM_SegmentLabel));
-  }
+// Of all frames, one behind the other.
+struct Pixels {
   Sint32 count = 0;
-  data.findAndGetSint32(DCM_NumberOfFrames, count);
-  Uint16 columns = 0, rows = 0, allocated = 0;
-  data.findAndGetUint16(DCM_Columns, columns);
-  data.findAndGetUint16(DCM_Rows, rows);
-  data.findAndGetUint16(DCM_BitsAllocated, allocated);
+  Uint16 columns = 0, rows = 0, allocated = 0;  // bits of a pixel: 1 or 8
+  Uint16 most = 255;                            // of a fractional segmentation: all of a voxel
+  const Uint8* bytes = nullptr;
+
+  std::size_t of_frame() const { return static_cast<std::size_t>(columns) * rows; }
+  bool set(std::size_t at) const {
+    return allocated == 1 ? ((bytes[at / 8] >> (at % 8)) & 1) != 0
+                          : bytes[at] > 0 && 2 * bytes[at] >= most;
+  }
+};
+
+Result<Pixels> pixels_of(DcmDataset& data) {
+  Pixels pixels;
+  data.findAndGetSint32(DCM_NumberOfFrames, pixels.count);
+  data.findAndGetUint16(DCM_Columns, pixels.columns);
+  data.findAndGetUint16(DCM_Rows, pixels.rows);
+  data.findAndGetUint16(DCM_BitsAllocated, pixels.allocated);
+  data.findAndGetUint16(DCM_MaximumFractionalValue, pixels.most);
+  const auto count = pixels.count;
+  const auto columns = pixels.columns, rows = pixels.rows, allocated = pixels.allocated;
   if (count < 1 || count > kMostFrames || columns < 1 || rows < 1 ||
       std::max(columns, rows) > kMaxSegVoxelsAlong || (allocated != 1 && allocated != 8)) {
     return unreadable(fmt::format("has {} frames of {} x {} pixels of {} bits: must be 1 or 8 bits",
@@ -137,49 +145,68 @@ Result<DicomSegmentation> parse_segmentation(DcmDataset& data) {
   if (element == nullptr || element->getUint8Array(bytes).bad() || bytes == nullptr) {
     return wrong_tag("PixelData (7fe0,0010)", "is missing");
   }
-  const std::size_t size = static_cast<std::size_t>(columns) * rows,
-                    all = size * static_cast<std::size_t>(count);
+  const std::size_t all = pixels.of_frame() * static_cast<std::size_t>(count);
   if (element->getLength() < (allocated == 1 ? (all + 7) / 8 : all)) {
     return wrong_tag("PixelData (7fe0,0010)",
                      fmt::format("has {} bytes, too few for {} frames of {} x {} pixels",
                                  element->getLength(), count, columns, rows));
   }
-  Uint16 most = 255;
-  data.findAndGetUint16(DCM_MaximumFractionalValue, most);
+  pixels.bytes = bytes;
+  return pixels;
+}
 
+// Of frames in the order of their depths, `step` apart.
+Result<VoxelImage> grid_of(const std::vector<Frame>& sorted, double step, const Pixels& pixels) {
+  const ImagePlane& first = sorted.front().plane;
+  const Vec3 normal = first.along_row.cross(first.along_column), to_ras(-1.0, -1.0, 1.0);
+  const double slices = std::round(sorted.back().depth / step) + 1.0;
+  if (slices > kMaxSegVoxelsAlong) return unreadable(fmt::format("has {:.0f} slices", slices));
+  VoxelImage grid;
+  grid.dims = {pixels.columns, pixels.rows, static_cast<int>(slices)};
+  grid.T_ras_voxel.linear().col(0) = to_ras.cwiseProduct(first.between_columns * first.along_row);
+  grid.T_ras_voxel.linear().col(1) = to_ras.cwiseProduct(first.between_rows * first.along_column);
+  grid.T_ras_voxel.linear().col(2) = to_ras.cwiseProduct(step * normal);
+  grid.T_ras_voxel.translation() = to_ras.cwiseProduct(first.position);
+  return grid;
+}
+
+Result<DicomSegmentation> parse_segmentation(DcmDataset& data) {
+  if (text_of(data, DCM_SOPClassUID) != UID_SegmentationStorage) {
+    return unreadable("is DICOM, but no segmentation (SEG)");
+  }
+  DicomSegmentation result;
+  for (Sint32 i = 0; DcmItem* const item = item_of(&data, DCM_SegmentSequence, i); ++i) {
+    Uint16 number = 0;
+    item->findAndGetUint16(DCM_SegmentNumber, number);
+    result.names[number] = to_utf8(text_of(*item, DCM_SegmentLabel));
+  }
+  const auto pixels = pixels_of(data);
+  if (!pixels) return tl::unexpected(pixels.error());
   std::vector<Frame> frames;
-  for (Sint32 f = 0; f < count; ++f) {
+  for (Sint32 f = 0; f < pixels->count; ++f) {
     auto frame = read_frame(data, f);
     if (!frame) return tl::unexpected(frame.error());
     if (result.names.count(frame->segment) == 0) {
       return unreadable(
           fmt::format("frame {} is of segment {}, which is not listed", f + 1, frame->segment));
     }
+    frame->number = static_cast<std::size_t>(f);
     frames.push_back(*frame);
   }
-  std::vector<Frame> sorted = frames;
-  const auto step = slice_step_of(sorted);
+  const auto step = slice_step_of(frames);
   if (!step) return tl::unexpected(step.error());
-  const ImagePlane& first = sorted.front().plane;
-  const Vec3 normal = first.along_row.cross(first.along_column), to_ras(-1.0, -1.0, 1.0);
-  const double slices = std::round(sorted.back().depth / *step) + 1.0;
-  if (slices > kMaxSegVoxelsAlong) return unreadable(fmt::format("has {:.0f} slices", slices));
-  VoxelImage& grid = result.grid;
-  grid.dims = {columns, rows, static_cast<int>(slices)};
-  grid.T_ras_voxel.linear().col(0) = to_ras.cwiseProduct(first.between_columns * first.along_row);
-  grid.T_ras_voxel.linear().col(1) = to_ras.cwiseProduct(first.between_rows * first.along_column);
-  grid.T_ras_voxel.linear().col(2) = to_ras.cwiseProduct(*step * normal);
-  grid.T_ras_voxel.translation() = to_ras.cwiseProduct(first.position);
-  for (const auto& [number, name] : result.names) result.segments[number].resize(grid.num_voxels());
-  for (std::size_t f = 0; f < frames.size(); ++f) {
-    const double depth = (frames[f].plane.position - first.position).dot(normal);
-    const std::size_t to = size * static_cast<std::size_t>(std::round(depth / *step));
-    std::vector<std::uint8_t>& voxels = result.segments[frames[f].segment];
+  auto grid = grid_of(frames, *step, *pixels);
+  if (!grid) return tl::unexpected(grid.error());
+  result.grid = std::move(*grid);
+  for (const auto& [number, name] : result.names) {
+    result.segments[number].resize(result.grid.num_voxels());
+  }
+  for (const Frame& frame : frames) {
+    const std::size_t size = pixels->of_frame(), from = frame.number * size;
+    const std::size_t to = size * static_cast<std::size_t>(std::round(frame.depth / *step));
+    std::vector<std::uint8_t>& voxels = result.segments[frame.segment];
     for (std::size_t v = 0; v < size; ++v) {
-      const std::size_t at = f * size + v;
-      const bool set = allocated == 1 ? ((bytes[at / 8] >> (at % 8)) & 1) != 0
-                                      : bytes[at] > 0 && 2 * bytes[at] >= most;
-      if (set) voxels[to + v] = 1;
+      if (pixels->set(from + v)) voxels[to + v] = 1;
     }
   }
   return result;

@@ -238,7 +238,9 @@ std::optional<std::string> incompatibility_of(const CondensedOperators& operator
              "is '" + operators.model_id + "': the operators belong to another model than '" +
                  model.model_id + "'");
   check.nodes("slaves", operators.slaves, n, false);
-  check.that(are_slaves(operators.slaves, model.slaves), "slaves",
+  std::vector<NodeIndex> slaves = model.slaves;
+  slaves.insert(slaves.end(), model.septa.slaves.begin(), model.septa.slaves.end());
+  check.that(are_slaves(operators.slaves, std::move(slaves)), "slaves",
              "names a node that is no slave of the model");
   check.nodes("region", operators.region, n, true);
   check.nodes("control", operators.control, n, true);

@@ -69,6 +69,15 @@ void visit_arrays(const Array& array, Model& model) {
   array("sets/fixed", model.fixed);
 }
 
+// Only in files of models that have them.
+template <typename Array, typename Model>
+void visit_anatomy(const Array& array, Model& model) {
+  array("anatomy/septum_slaves", model.septa.slaves);
+  array("anatomy/septum_normals", model.septa.normals);
+  array("anatomy/septum_triangles", model.septa.triangles);
+  array("anatomy/ventricle_wall", model.ventricle_wall);
+}
+
 void write_brain_model(Hdf5Writer& out, const BrainModel& model) {
   out.attribute("/", "case_id", model.case_id);
   out.attribute("/", "model_id", model.model_id);
@@ -77,6 +86,11 @@ void write_brain_model(Hdf5Writer& out, const BrainModel& model) {
   out.number("/", "slave_plane_depth_mm", model.slave_plane_depth_mm);
   for (const char* group : {"mesh", "skull", "tumour", "sets"}) out.group(group);
   visit_arrays([&](const char* name, const auto& values) { out.write(name, values); }, model);
+  if (!model.septa.slaves.empty() || model.ventricle_wall.cols() > 0) {
+    out.group("anatomy");
+    out.number("anatomy", "septum_gap_mm", model.septa.gap_mm);
+    visit_anatomy([&](const char* name, const auto& values) { out.write(name, values); }, model);
+  }
   write_distance_grid(out, model.tumour_distance);
 }
 
@@ -91,6 +105,10 @@ BrainModel read_brain_model(const Hdf5Reader& in) {
   model.fluid_plane_depth_mm = in.number<double>("/", "fluid_plane_depth_mm");
   model.slave_plane_depth_mm = in.number<double>("/", "slave_plane_depth_mm");
   visit_arrays([&](const char* name, auto& values) { in.read(name, values); }, model);
+  if (in.has("anatomy")) {
+    model.septa.gap_mm = in.number<double>("anatomy", "septum_gap_mm");
+    visit_anatomy([&](const char* name, auto& values) { in.read(name, values); }, model);
+  }
   model.tumour_distance = read_distance_grid(in);
   if (content_hash(model) != model.model_id) {
     throw Hdf5Problem{"content does not match its model_id (" + model.model_id +

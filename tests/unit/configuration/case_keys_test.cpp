@@ -52,7 +52,7 @@ template <typename T, std::size_t... I>
 constexpr bool takes(std::index_sequence<I...>) {
   return requires { T{(void(I), Anything{})...}; };
 }
-template <typename T, std::size_t N = 20>
+template <typename T, std::size_t N = 40>
 constexpr int members() {
   if constexpr (takes<T>(std::make_index_sequence<N>())) {
     return static_cast<int>(N);

@@ -58,6 +58,21 @@ TEST(Tissues, LabelsAndTumourHaveTheirOwnStiffness) {
   EXPECT_LT(tumour, model.mesh.num_tets() / 2);
 }
 
+TEST(Tissues, TissuesOfTheLabelMapAreInUnitsOfTheBrains) {
+  BrainModel model = labelled_patient();
+  for (int& label : model.mesh.labels) label = label == 5 ? kWhiteMatter : kBrainstemLabel;
+  model.mesh.labels[0] = 0;
+  Material material;
+  material.shear_modulus_pa = 1000.0;
+  material.regions[kBrainstemLabel] = {9000.0, 0.4};
+  const auto map = value_or_fail(tissue_map(model, material));
+  EXPECT_DOUBLE_EQ(shear_pa(map, 0), 1000.0);
+  for (int t = 1; t < model.mesh.num_tets(); ++t) {
+    const bool white = model.mesh.labels[static_cast<std::size_t>(t)] == kWhiteMatter;
+    EXPECT_DOUBLE_EQ(shear_pa(map, t), white ? 1160.0 : 9000.0);
+  }
+}
+
 TEST(Tissues, ALabelThatTheMeshDoesNotHaveIsNamed) {
   Material material;
   material.regions[7] = {};

@@ -6,6 +6,7 @@
 #include <unistd.h>
 
 #include <fstream>
+#include <new>
 #include <numeric>
 #include <system_error>
 
@@ -38,6 +39,23 @@ TEST(ThreadTeam, OneMemberIsTheCaller) {
   std::thread::id id;
   team.split(5, [&](long, long) { id = std::this_thread::get_id(); });
   EXPECT_EQ(id, std::this_thread::get_id());
+}
+
+TEST(ThreadTeam, AnExceptionOfAnyMemberIsTheCallersOnceAllAreDone) {
+  ThreadTeam team(4);
+  for (int thrower = 0; thrower < 4; ++thrower) {
+    std::atomic<int> done{0};
+    auto task = [&](int member) {
+      if (member == thrower) throw std::bad_alloc();
+      ++done;
+    };
+    EXPECT_THROW(team.run(task), std::bad_alloc);
+    EXPECT_EQ(done, 3);
+  }
+  std::atomic<int> done{0};
+  auto task = [&](int) { ++done; };
+  team.run(task);
+  EXPECT_EQ(done, 4) << "the team goes on";
 }
 
 TEST(ThreadTeam, IsBoundedWhateverTheMachineHas) { EXPECT_EQ(ThreadTeam(128).size(), 16); }

@@ -97,6 +97,20 @@ TEST(CompactColumns, BasisTimesCoefficientsIsTheColumn) {
   }
 }
 
+// Column 0 has -150 in direction 8 and 63.5 in the last one, 20, and nothing between.
+TEST(CompactColumns, NoMoreIsLeftOutOfASumThanIsAllowed) {
+  const CompactColumns columns = made();
+  const CompactColumns::Term one[] = {{0, 1.0F}};
+  Eigen::VectorXf exact(21), less(21);
+  columns.sum(0, one, exact.data());
+  ASSERT_EQ(exact[20], 63.5F);
+  columns.sum(0, one, less.data(), 63.4F);
+  EXPECT_EQ(less, exact);
+  columns.sum(0, one, less.data(), 63.6F);
+  EXPECT_EQ(less[20], 0.0F);
+  EXPECT_EQ(less.head(20), exact.head(20));
+}
+
 TEST(CompactColumns, NoNodesAndNoColumnsAreValid) {
   EXPECT_EQ(made({}).num_nodes(), 0);
   CompactParts still = example();

@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "common/fem/elasticity.hpp"
+#include "common/geometry/slit_mesh.hpp"
 #include "common/geometry/surface.hpp"
 #include "tests/support/dense.hpp"
 #include "tests/support/results.hpp"
@@ -43,7 +44,7 @@ LoadModes modes_of(const BrainModel& patient, const CaseConfig& config) {
 TEST(LoadModes, StandInTheOrderOfTheirParts) {
   const BrainModel patient = test_support::toy_patient(8);
   const LoadModes modes = modes_of(patient, only(1.0, 0.05, 0.01, 1.0, 300.0, 600.0));
-  const PerPart<int> expected = {2, 4, 0, 0, 27, 4, 9, 21, 0, 0, 0, 0};
+  const PerPart<int> expected = {2, 4, 0, 0, 27, 4, 9, 21, 0, 0, 0, 0, 0};
   EXPECT_EQ(modes.of_part, expected);
   EXPECT_EQ(modes.size(), 67);
   EXPECT_EQ(part_of_column(1, modes.of_part), PriorPart::kAlongGravity);
@@ -370,12 +371,96 @@ TEST_F(OpeningModes, CanStandForAPushOnAPartOfIt) {
   EXPECT_GT(left(uniform), 0.7);
 }
 
+// Along the way from the toy's opening to its tumour: three hats, of each three stresses that carry
+// no net force, and two forces across the way.
+TEST_F(OpeningModes, InstrumentsPressAlongTheWayToTheTumour) {
+  CaseConfig config = only(0.0, 0.0, 0.0, 0.0, 0.0, 0.0);
+  config.prior.tract_pressure_sd_pa = 2000.0;
+  const LoadModes tract = modes_of(patient, config);
+  ASSERT_EQ(tract.of_part[static_cast<std::size_t>(PriorPart::kTract)], 15);
+  ASSERT_EQ(tract.size(), 15);
+  const VecX area = areas(0.0);
+  const Vec3 from = patient.mesh.nodes * area / area.sum();
+  const Vec3 to = patient.tumour.vertices.rowwise().mean();
+  const Vec3 axis = (to - from).normalized();
+  const VecX volumes = fem::nodal_volumes(patient.mesh);
+  const auto weight = [&](const Vec3& x, int k) {
+    const double depth = axis.dot(x - from), aside = axis.cross(x - from).norm() / kTractWidth_mm;
+    return std::max(0.0, 1.0 - std::abs(2.0 * depth / (to - from).norm() - k)) *
+           std::exp(-0.5 * aside * aside);
+  };
+  for (int j = 0; j < 15; ++j) {
+    const auto force = mode(tract.columns, j);
+    const double size = force.colwise().norm().sum();
+    const Vec3 net = force.rowwise().sum();
+    ASSERT_GT(size, 0.0) << j;
+    double expected = 0.0;  // 2 kPa = 0.002 N/mm^2
+    for (int i = 0; i < patient.mesh.num_nodes(); ++i) {
+      expected += volumes[i] * 0.002 / kTractWidth_mm * weight(patient.mesh.nodes.col(i), j / 5);
+    }
+    if (j % 5 < 3) {
+      EXPECT_LT(net.norm(), 1e-12 * size) << j;
+    } else {
+      EXPECT_NEAR(net.norm(), expected, 1e-9 * expected) << j;
+      EXPECT_LT(std::abs(net.dot(axis)), 1e-9 * net.norm()) << j;
+    }
+  }
+}
+
+// Three bumps of strain on each side of the middle, which do the work of their strain.
+TEST(LoadModes, VentriclesLieOnBothSides) {
+  const BrainModel patient = test_support::toy_patient(8);
+  CaseConfig config = only(0.0, 0.0, 0.0, 0.0, 0.0, 0.0);
+  config.prior.ventricle_volume_strain_sd = 0.05;
+  const LoadModes modes = modes_of(patient, config);
+  ASSERT_EQ(modes.of_part[static_cast<std::size_t>(PriorPart::kBrainVolume)], 6);
+  const Points& nodes = patient.mesh.nodes;
+  const Vec3 low = nodes.rowwise().minCoeff(), extent = nodes.rowwise().maxCoeff() - low;
+  const Vec3 tumour = patient.tumour.vertices.rowwise().mean();
+  const double kappa = bulk_modulus(config.material);
+  for (int j = 0; j < 6; ++j) {
+    const Vec3 place(j < 3 ? 0.4 : 0.6, 0.35 + 0.15 * (j % 3), 0.55);
+    const double expected = 0.05 * expected_work(patient, low + place.cwiseProduct(extent) - tumour,
+                                                 0.1 * extent.y(), [&](double) { return kappa; });
+    EXPECT_NEAR(mode(modes.columns, j).cwiseProduct(nodes).sum(), expected,
+                1e-9 * std::abs(expected));
+  }
+}
+
 TEST(LoadModes, ATumourWithoutATetrahedronIsNamed) {
   BrainModel patient = test_support::toy_patient();
   CaseConfig config = test_support::toy_config();
   config.material.tumour = TissueStiffness{6300.0, 0.45};
   patient.tumour.vertices.colwise() += Vec3(500.0, 0.0, 0.0);
   refusal_of(load_modes(patient, config), ErrorCode::kEmptySet);
+}
+
+// A cavity of one cell of the box: pressure on its wall balances itself, and does the work p dV
+// when the cavity grows.
+TEST(LoadModes, VentriclesPressOnTheirWall) {
+  BrainModel patient = test_support::toy_patient(6);
+  std::vector<char> taken;
+  for (int t = 0; t < patient.mesh.num_tets(); ++t) {
+    Vec3 centre = Vec3::Zero();
+    for (int k = 0; k < 4; ++k) centre += 0.25 * patient.mesh.nodes.col(patient.mesh.tets(k, t));
+    taken.push_back((centre - Vec3(35, 25, 25)).cwiseAbs().maxCoeff() < 5.0);
+  }
+  auto cut = geometry::cut_mesh(patient.mesh, taken, {}, {});
+  patient.mesh = std::move(cut.mesh);
+  patient.ventricle_wall = std::move(cut.wall);
+  CaseConfig config = only(0, 0, 0, 0, 0, 0);
+  config.prior.ventricle_pressure_sd_pa = 500.0;
+  const LoadModes modes = modes_of(patient, config);
+  ASSERT_EQ(modes.of_part[static_cast<std::size_t>(PriorPart::kVentricles)], 2);
+  const Points load =
+      Eigen::Map<const Points>(modes.columns.col(0).data(), 3, patient.mesh.num_nodes());
+  EXPECT_LT(load.rowwise().sum().norm(), 1e-15);
+  const Points growing = patient.mesh.nodes.colwise() - Vec3(35, 25, 25);
+  EXPECT_NEAR(load.cwiseProduct(growing).sum(), 500e-6 * 3.0 * 1000.0, 1e-12);
+  const TriangleSurface wall{patient.mesh.nodes, patient.ventricle_wall};
+  EXPECT_NEAR(-geometry::enclosed_volume(wall), 1000.0, 1e-9);
+  config.prior.ventricle_pressure_sd_pa = 0.0;
+  EXPECT_EQ(modes_of(patient, config).size(), 0);
 }
 
 }  // namespace

@@ -87,6 +87,17 @@ TEST(SurfaceDistances, OfASunkenCortexAreTheDepthAlongItsNormal) {
   }
 }
 
+TEST(SurfaceDistances, EndWhenTheyAreTold) {
+  std::stop_source stop;
+  SurfaceDistanceOptions options;
+  options.stop = stop.get_token();
+  EXPECT_TRUE(SurfaceDistances::build(indexed(cap()), points_on_cap(5000, 7.0), options));
+  stop.request_stop();
+  EXPECT_EQ(refusal_of(SurfaceDistances::build(indexed(cap()), points_on_cap(5000, 7.0), options),
+                       ErrorCode::kNotConverged),
+            "cortical surface: was stopped");
+}
+
 // A distance hardly notices where along the surface it is taken.
 TEST(SurfaceDistances, AreSettledAcrossTheSurfaceSoonerThanAlongIt) {
   const SurfaceDistances surface = built(points_on_cap(400, 6.0));

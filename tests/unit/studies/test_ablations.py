@@ -14,8 +14,8 @@ FOLDER = DOCS / "ablations"
 
 
 def row(variant, truth="mesh", data="tumour", seed=1, tumour=1.0, coverage=0.9):
-    """Craniotomy and brain have ten times the tumour's error."""
-    return {"head": "h", "patient": 1, "truth": truth, "seed": seed, "variant": variant, "data": data,
+    """A patient per seed. Craniotomy and brain have ten times the tumour's error."""
+    return {"head": "h", "patient": seed, "truth": truth, "seed": seed, "variant": variant, "data": data,
             "status": "converged", "nodes": 100, "initial_mm": 5, "tumour_mm": tumour, "cppd_mm": 10 * tumour,
             "initial_field_mm": 9, "field_mm": 10 * tumour, "coverage_90": coverage, "quality": "good", "update_ms": ""}
 
@@ -73,7 +73,7 @@ def test_pairs_are_of_the_same_surgery_and_the_same_data():
             row("fixed", tumour=1.5), row("fixed", data="tumour+cortex", tumour=0.75),
             row("fixed", "gap", seed=2, tumour=4.0)]
     alone = found(rows, "fixed", group="one ingredient")
-    assert alone.pairs == 2
+    assert alone.patients == 2
     assert alone.of_default == pytest.approx(math.sqrt(1.0 * 2.0), abs=1e-12)  # geometric means
     assert alone.of_variant == pytest.approx(math.sqrt(1.5 * 4.0), abs=1e-12)
     assert alone.change() == pytest.approx(math.sqrt(3.0) - 1.0, abs=1e-12)
@@ -82,10 +82,22 @@ def test_pairs_are_of_the_same_surgery_and_the_same_data():
     assert found(rows, "fixed", group="resection", data=ALL_DATA) is None
 
 
+def test_surgeries_of_one_patient_are_one_sample():
+    """Seeds of a truth first, then the truths of a patient, then the patients."""
+    rows = []
+    for patient, truth, seed, tumour in ((1, "mesh", 1, 4.0), (1, "mesh", 2, 16.0), (1, "gap", 1, 2.0), (2, "mesh", 1, 1.0)):
+        rows += [{**row("default", truth, seed=seed), "patient": patient},
+                 {**row("fixed", truth, seed=seed, tumour=tumour), "patient": patient}]
+    one = found(rows, "fixed")
+    assert one.patients == 2
+    assert one.of_variant == pytest.approx(2 ** 1.0, abs=1e-12)  # patient 1: 2^((3 + 1) / 2); patient 2: 1
+    assert found([{**one, "patient": 1} for one in rows], "fixed") is None
+
+
 def test_refused_updates_are_no_pairs():
     rows = [row("default", seed=seed) for seed in (1, 2, 3)]
     rows += [row("fixed", seed=1, tumour=2), refused("fixed", 2), row("fixed", seed=3, tumour=2)]
-    assert found(rows, "fixed").pairs == 2
+    assert found(rows, "fixed").patients == 2
 
 
 def test_an_update_with_less_data_is_held_against_the_last_one():
@@ -141,9 +153,9 @@ def test_a_part_of_the_default_that_buys_nothing_is_red():
     rows = table_of(made_up())
     verdicts = Verdicts(lambda record: ablations.judge(rows, ablations.held_parts(rows), record))
     begin = "ablations,{}: combinations in which it buys something,"
-    assert any(line.startswith(begin.format("contact") + "12,>= 1 (of 16; it costs something in 0),1,")
+    assert any(line.startswith(begin.format("contact") + "12,>= 2 (of 16; it costs something in 0),1,")
                for line in verdicts.lines)
-    assert any(line.startswith(begin.format("rank") + "0,>= 1 (of 16; it costs something in 0),0,")
+    assert any(line.startswith(begin.format("rank") + "0,>= 2 (of 16; it costs something in 0),0,")
                for line in verdicts.lines)
     assert any(line.startswith(begin.format("a higher rank") + "12,shown; of 16; it costs something in 0,,")
                for line in verdicts.lines)

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Rows, checks, statistics, exit status."""
+import gzip
 import json
 import math
 
@@ -11,8 +12,9 @@ from studies import chart
 from studies.__main__ import NAMES, run
 from studies.checks import Check, Record, at_most, every_check_holds, summary_json
 from studies.common import InputError, WriteError, write_file
-from studies.rows import Table, csv_text, significant
-from studies.stats import correlation, incomplete_beta, mean_std, paired_t_test, pareto_front, percentile
+from studies.rows import Table, csv_text, significant, study_rows
+from studies.stats import (Interval, correlation, incomplete_beta, mean_std, over_patients, paired_t_test, pareto_front,
+                           percentile, ratio_over_patients, t_quantile)
 
 NONE = math.nan
 
@@ -47,6 +49,19 @@ def test_tables_are_joined_only_with_equal_headings(tmp_path):
         Table.read_all([tmp_path / "1.csv", tmp_path / "3.csv"])
     with pytest.raises(InputError, match="cannot be opened"):
         Table.read(tmp_path / "none.csv")
+
+
+def test_compressed_rows_are_read_as_others_are(tmp_path):
+    packed = tmp_path / "rows-h.csv.gz"
+    packed.write_bytes(gzip.compress(b"a\n7\n"))
+    assert list(study_rows(tmp_path, ("a",)).numbers("a")) == [7]
+    (tmp_path / "rows-h.csv").write_text("a\n7\n")
+    with pytest.raises(InputError, match="rows-h.csv.gz: rows-h.csv stands beside it"):
+        study_rows(tmp_path, ("a",))
+    for content in (b"a\n7\n", gzip.compress(b"a\n7\n")[:-6]):
+        packed.write_bytes(content)
+        with pytest.raises(InputError, match="rows-h.csv.gz: is not what gzip writes"):
+            Table.read(packed)
 
 
 def test_rows_are_chosen_and_grouped_in_their_order():
@@ -106,6 +121,29 @@ def test_the_paired_test_of_students_sleep_data():
     test = paired_t_test(first, second)
     assert test.pairs == 10 and test.mean == pytest.approx(-1.58, abs=1e-12)
     assert test.t == pytest.approx(-4.0621, abs=1e-4) and test.p == pytest.approx(0.002833, abs=1e-6)
+
+
+# Tables of Student's t: 12.706, 2.776, 1.984.
+@pytest.mark.parametrize("freedom, quantile", [(1, 12.7062), (4, 2.77645), (100, 1.98397)])
+def test_the_interval_over_patients_is_students(freedom, quantile):
+    assert t_quantile(freedom) == pytest.approx(quantile, rel=1e-5)
+
+
+def test_a_mean_over_patients_has_the_width_that_their_number_allows():
+    found = over_patients([1, 2, 3, 4, 5, NONE])
+    assert (found.mean, found.count) == (3, 5)
+    half = 2.77645 * math.sqrt(2.5 / 5)
+    assert (found.low, found.high) == (pytest.approx(3 - half, rel=1e-5), pytest.approx(3 + half, rel=1e-5))
+    assert str(found) == "3; 1.04 to 4.96 over 5 patients"
+    one = over_patients([2])
+    assert (one.mean, one.low, one.high) == (2, -math.inf, math.inf) and str(one) == "2 of 1 patient"
+    assert over_patients([NONE]).count == 0 and math.isnan(Interval().mean)
+
+
+def test_ratios_are_averaged_as_factors():
+    found = ratio_over_patients([0.5, 2, NONE, -1])
+    assert (found.mean, found.count) == (pytest.approx(1), 2) and found.low == pytest.approx(1 / found.high)
+    assert ratio_over_patients([3]).high == math.inf
 
 
 def test_the_paired_test_leaves_missing_pairs_out_and_needs_two():

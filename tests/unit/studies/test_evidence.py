@@ -11,7 +11,7 @@ from studies.rows import Table
 
 FOLDER = DOCS / "evidence"
 TABLES = sorted(FOLDER.glob("rows-*.csv"))
-LANDMARKS = FOLDER / "landmarks-resect-4.csv"
+LANDMARKS = {path.stem.removeprefix("landmarks-"): path for path in sorted(FOLDER.glob("landmarks-*.csv"))}
 PAGE = (DOCS / "evidence.md").read_text()
 
 
@@ -46,7 +46,8 @@ def verdict(rows, name):
 
 def test_committed_rows_give_the_committed_checks():
     def judge(record):
-        evidence.check_landmarks("resect-4", Table.read(LANDMARKS), record)
+        for case, table in LANDMARKS.items():
+            evidence.check_landmarks(case, Table.read(table), record)
         for own in Table.read_all(TABLES).groups("head").values():
             evidence.EvidenceChecks(own, record).run()
     assert judged(judge) == committed("evidence")
@@ -54,13 +55,13 @@ def test_committed_rows_give_the_committed_checks():
 
 def test_the_page_has_the_tables_of_its_rows():
     checks, rows = Table.read(FOLDER / "checks.csv"), Table.read_all(TABLES)
-    assert checks.values("study") == ["resect-4", "colin27", "mni152"] and len(rows) > 800
+    assert checks.values("study") == ["resect-1", "resect-4", "colin27", "mni152"] and len(rows) > 800
     for study in checks.values("study"):
         assert claims_table(checks, study) in PAGE
     for head, own in rows.groups("head").items():
         assert truths_table(own) in PAGE
         assert patient_tables(own) == (FOLDER / f"patients-{head}.md").read_text()
-    assert landmarks_table(Table.read(LANDMARKS)) in PAGE
+    assert landmarks_table({case: Table.read(table) for case, table in LANDMARKS.items()}) in PAGE
 
 
 @pytest.mark.parametrize("truth, least", [("consistency", 95), ("gap", 88), ("all", 80), ("calculix", 80)])
@@ -86,15 +87,32 @@ def test_the_craniotomy_is_bound_with_its_own_data_and_without_them():
     assert verdict(rows, f"gap: {alone}") == "" and verdict(rows, f"gap: {joint}") == "1"
 
 
-def test_contact_may_be_worse_than_fixed_by_chance_alone():
-    name, rows = "gap: craniotomy CPPD with contact", good("gap")
+def ratio_of(rows, column):
+    return evidence.over_fixed({(boundary, data): table_of(rows).where(boundary=boundary, data=data)
+                                for boundary in ("contact", "fixed") for data in ("tumour", "tumour+cortex")}, column)
+
+
+def test_contact_must_not_be_worse_than_fixed_in_ratio_over_patients():
+    name, rows = "gap: craniotomy CPPD with contact over that of fixed", good("gap")
     assert verdict(rows, name) == "1"
-    rows = of(of(rows, {"cppd_mm": 0.4}, boundary="fixed"), {"cppd_mm": 0.5}, boundary="contact")
+    rows = of(rows, {"cppd_mm": 0.4}, boundary="fixed")
+    assert verdict(of(rows, {"cppd_mm": 0.41}, boundary="contact"), name) == "0"
+    # One patient gains by millimetres, the other loses by a factor: the factor counts.
+    rows = of(of(rows, {"cppd_mm": 5}, boundary="fixed", patient=1), {"cppd_mm": 4}, boundary="contact", patient=1)
+    rows = of(of(rows, {"cppd_mm": 0.1}, boundary="fixed", patient=2), {"cppd_mm": 0.2}, boundary="contact", patient=2)
     assert verdict(rows, name) == "0"
-    contact = [row for row in rows if row["boundary"] == "contact"]
-    for i, row in enumerate(contact):  # now worse, now better, on average a little worse
-        row["cppd_mm"] = 0.9 if i % 2 else 0.0
+    interval = ratio_of(rows, "cppd_mm")
+    assert interval.mean == pytest.approx((0.8 * 2) ** 0.5) and interval.count == 2
+
+
+def test_a_surgery_that_one_boundary_refused_counts_in_neither():
+    name = "gap: tumour error with contact over that of fixed"
+    for refused, other in (("fixed", "contact"), ("contact", "fixed")):
+        rows = of(good("gap"), {"tumour_mm": ""}, boundary=refused, data="tumour", seed=1)
+        assert len({ratio_of(of(rows, {"tumour_mm": error}, boundary=other, data="tumour", seed=1), "tumour_mm").mean
+                    for error in (0.001, 100)}) == 1
     assert verdict(rows, name) == "1"
+    assert verdict([row for row in rows if row["patient"] == 1 or row["boundary"] == "contact"], name) is None
 
 
 def test_coverage_is_bound_over_the_adverse_truths_alone():
@@ -113,10 +131,11 @@ def test_fields_of_another_mesh_are_left_out():
 
 
 def test_an_update_worse_than_a_rigid_shift_is_counted():
-    name, rows = "all: updates worse at the tumour than a rigid shift", good("all")
-    assert verdict(rows, name) == "1"
-    rows[0]["tumour_mm"] = 0.5
-    assert verdict(rows, name) == "0"
+    for truth in ("all", "segmentation", "consistency"):
+        name, rows = f"{truth}: updates worse at the tumour than a rigid shift", good(truth)
+        assert verdict(rows, name) == "1"
+        rows[0]["tumour_mm"] = 0.5
+        assert verdict(rows, name) == "0"
 
 
 def test_claims_name_what_missed_its_bound_and_leave_out_what_has_none():
@@ -144,21 +163,34 @@ def test_truths_are_averaged_over_patients_not_over_rows():
 
 
 def test_landmarks_are_compared_by_root_mean_squares():
-    text = landmarks_table(Table.parse("landmark,none_mm,rigid_mm,affine_mm,thin_plate_mm,estimate_mm\n"
-                                       "1,3,1,1,1,1\n2,4,7,1,1,2\n", "landmarks"))
-    assert "| no correction | 3.536 mm |" in text and "| rigid | 5.000 mm |" in text
-    assert "| **estimate** | 1.581 mm | |" in text
+    text = landmarks_table({"c": left_out((3, 1, 1, 1, 1), (4, 7, 1, 1, 2))})
+    assert "| `c`, supine | 3.536, 5.000, 1.000, 1.000 | 1.581 | 0.316; " in text and "| 0.83 | 0.25 |" in text
+
+
+def left_out(*distances, inside=(3, 2), pose="supine"):
+    return Table.parse("pose,landmark,none_mm,rigid_mm,affine_mm,thin_plate_mm,estimate_mm,estimated_motion_mm,sd_mm,inside_90,"
+                       "quality\n" + "".join(f"{pose},{i},{','.join(map(str, of))},0.25,0.5,{inside[i % 2]},good\n"
+                                             for i, of in enumerate(distances)), "landmarks")
+
+
+def test_an_estimate_of_landmarks_must_beat_rigid_and_cover_what_it_says():
+    def red(rows):
+        return Verdicts(lambda record: evidence.check_landmarks("c", rows, record)).red()
+    assert red(left_out((3, 1, 1, 1, 0.9), (3, 1, 1, 1, 0.9))) == []
+    assert red(left_out((3, 1, 1, 1, 1), (3, 1, 1, 2, 1))) == ["supine: estimate over rigid"]
+    assert red(left_out((3, 2, 1, 0.8, 1))) == ["supine: coverage of the 90 % interval", "supine: estimate over thin-plate spline"]
+    assert red(left_out((3, 2, 1, 2, 1), (3, 2, 1, 2, 1), inside=(2, 2))) == ["supine: coverage of the 90 % interval"]
 
 
 def test_the_command_writes_checks_tables_and_pictures(tmp_path):
-    for table in (*TABLES, LANDMARKS):
+    for table in (*TABLES, *LANDMARKS.values()):
         shutil.copy(table, tmp_path)
     done = run("evidence", "--dir", tmp_path)
     assert done.returncode == 1 and "FAILS  colin27: all: tumour recovered %" in done.stdout
     for name in ("checks.csv", "patients-colin27.md", "patients-mni152.md"):
         assert (tmp_path / name).read_text() == (FOLDER / name).read_text()
-    assert (tmp_path / "page.md").read_text().startswith("resect-4\n\n| figure | bound |")
-    for name in ("tumour", "craniotomy", "coverage", "reliability", "landmarks"):
+    assert (tmp_path / "page.md").read_text().startswith("resect-1\n\n| figure | bound |")
+    for name in ("tumour", "craniotomy", "coverage", "reliability", "landmarks-resect-1", "landmarks-resect-4"):
         assert 5_000 < (tmp_path / f"evidence-{name}.png").stat().st_size < 60_000
 
 

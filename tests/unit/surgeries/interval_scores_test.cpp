@@ -89,6 +89,9 @@ TEST(Regions, ScoreTheirOwnNodesOnly) {
   EXPECT_NEAR(score.error_mm, 0.15, 1e-12);
   EXPECT_NEAR(score.none_mm, std::sqrt(3.0), 1e-12);
   EXPECT_NEAR(score.coverage_90, 5.0 / 6.0, 1e-12);
+  for (std::size_t i = 0; i < kIntervals.size(); ++i) {  // the error is three standard deviations
+    EXPECT_NEAR(score.coverage[i], 5.0 / 6.0, 1e-12) << kIntervals[i].percent;
+  }
   EXPECT_NEAR(score.rms_error_mm, 0.3 / std::sqrt(6.0), 1e-12);
   EXPECT_NEAR(score.rms_sd_mm, 0.1, 1e-12);
   EXPECT_NEAR(score.interval_mm, (interval_score(0.3, 0.1) + 5.0 * interval_score(0.0, 0.1)) / 6.0,

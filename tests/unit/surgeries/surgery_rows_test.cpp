@@ -135,6 +135,33 @@ TEST_F(Score, NodesInACavityDoNotCount) {
   EXPECT_EQ(of.worse_nodes, 0);
 }
 
+// Of a region: within 0.68 but beyond 0.50.
+TEST_F(Score, RegionsHaveTheSharesOfTheirOwnNodesInEveryInterval) {
+  estimate.displacement.array() += 0.1 * 0.8;
+  const UpdateScore of = score();
+  const std::array<double, 6> inside = {0, 1, 1, 1, 1, 1};
+  for (std::size_t i = 0; i < inside.size(); ++i) {
+    EXPECT_DOUBLE_EQ(of.near.coverage[i], inside[i]) << kIntervals[i].percent;
+  }
+  EXPECT_DOUBLE_EQ(of.near.coverage_90, 1.0);
+}
+
+// What an update marks as unseen may be wrong; what it does not mark is its word.
+TEST_F(Score, AFarErrorIsUnmarkedWhereTheUpdateSaysThatItKnows) {
+  EXPECT_TRUE(std::isnan(score().far_known));  // the method does not say
+  truth.points["sparse"] = {{Eigen::Vector4i::Constant(0)}};
+  truth.points["cross"] = {{Eigen::Vector4i::Constant(1)}, {Eigen::Vector4i::Constant(7)}};
+  const int n = model.mesh.num_nodes();
+  estimate.displacement.row(1).array() += 4.0;
+  estimate.known = VecX::Constant(n, 0.49);
+  EXPECT_NEAR(score().far_known, 0.49, 1e-12);
+  EXPECT_GT(score().far.nodes, 0);
+  EXPECT_DOUBLE_EQ(score().far_unmarked_mm, 0.0);
+  estimate.known.setConstant(0.5);
+  EXPECT_NEAR(score().far_unmarked_mm, 4.0, 1e-12);
+  EXPECT_NEAR(score().near_known, 0.5, 1e-12);
+}
+
 TEST_F(Score, AnEstimateOfAnotherMeshIsRefused) {
   estimate.displacement = Points::Zero(3, 5);
   EXPECT_FALSE(score_update(model, truth, estimate));

@@ -7,6 +7,7 @@
 
 #include "common/wire/convert.hpp"
 #include "common/wire/frame.hpp"
+#include "tests/support/study_record.hpp"
 
 namespace brainshift::wire {
 namespace {
@@ -43,18 +44,22 @@ std::string refusal(const std::string& bytes) {
 TEST(MalformedFrames, AreRefusedAsTheTableSays) {
   std::ifstream table(BRAINSHIFT_SOURCE_DIR "/tests/data/wire/malformed.txt");
   std::string verdict, name, hex, line;
-  int rows = 0;
+  int rows = 0, wrong = 0;
   while (std::getline(table, line)) {
     const std::size_t first = line.find(' ');
     const std::size_t second = line.find(' ', first + 1);
     verdict = line.substr(0, first);
     name = line.substr(first + 1, second - first - 1);
     const std::string why = refusal(bytes_of(line.substr(second + 1)));
+    wrong += why.empty() == (verdict == "ok") && why.find('\n') == std::string::npos ? 0 : 1;
     EXPECT_EQ(why.empty(), verdict == "ok") << name << ": " << why;
     EXPECT_EQ(why.find('\n'), std::string::npos) << name;
     ++rows;
   }
-  EXPECT_GE(rows, 300);
+  const std::string source = "unit_wire --gtest_filter=MalformedFrames.*";
+  EXPECT_TRUE(test_support::record_check("malformed", "rows", rows, ">= 300", rows >= 300, source));
+  EXPECT_TRUE(test_support::record_check("malformed", "C++ client: verdicts other than the table's",
+                                         wrong, "= 0", wrong == 0, source));
 }
 
 }  // namespace

@@ -140,6 +140,7 @@ inline void expect_same(const Estimate& a, const Estimate& b) {
   expect_same_matrix(a.sd_mm, b.sd_mm);
   expect_same_matrix(a.known, b.known);
   expect_same_or_absent(a.region_known, b.region_known);
+  expect_same_or_absent(a.ventricle_change_mm3, b.ventricle_change_mm3);
   EXPECT_EQ(a.contact.active, b.contact.active);
   EXPECT_EQ(a.contact.penetrating, b.contact.penetrating);
   EXPECT_EQ(a.contact.max_penetration_mm, b.contact.max_penetration_mm);

@@ -144,6 +144,7 @@ inline UpdateMessage sample_judged_update() {
   estimate.quality.reason = "éléments retournés (3)";
   estimate.known = Eigen::Vector4d(0, 1, 128, 255) / 255.0;  // as bytes hold it
   estimate.region_known = 1.0 / 3.0;
+  estimate.ventricle_change_mm3 = -8125.5;
   estimate.contact.decrement = 1.0 / 3.0;
   estimate.contact.max_violation_mm = -0.1;  // every slave is open
   estimate.misfit_ratio = 1.7;

@@ -43,7 +43,7 @@ MEASURES = (
     Measure("largest_shift_mm", ("largest_true_displacement_mm",), "mm", "largest true displacement of a node"),
     Measure("coverage_90", ("coverage_90",), "1",
             "share of true displacement components inside the 90 % interval; 0.9 is right", "near 0.9"),
-    Measure("region_known", ("region_known",), "1", "share of the variance about the surgery that the data took away"),
+    Measure("region_known", ("region_known",), "1", "share of the standard deviation about the surgery that the data took away"),
     Measure("misfit_mm", ("error_mm", "sparse", "mean"), "mm", "misfit where data were measured, mean"),
     Measure("unusable_updates", ("quality", "counts", "unusable"), "1", "updates that may not be shown", "lower"),
 )

@@ -49,7 +49,7 @@ TEST(NewtonBundle, APieceThatWasMetElsewhereIsSeenFromThePoint) {
   ASSERT_GT(q2(trial), q1(trial));
   NewtonBundle bundle(2);
   bundle.add_here(a - point);
-  bundle.add_at(trial - point, q2(trial) - q1(point), b - trial);
+  ASSERT_TRUE(bundle.add_at(trial - point, q2(trial) - q1(point), b - trial));
   bundle.solve();
   const VecX found = point + bundle.step();
   EXPECT_NEAR(q1(found), q2(found), 1e-3);
@@ -67,12 +67,12 @@ TEST(NewtonBundle, PiecesMoveWithThePoint) {
   const auto q2 = [&](const VecX& x) { return 0.5 * (x - b).squaredNorm() + 3.0; };
   NewtonBundle moved(2), there(2);
   moved.add_here(a - point);
-  moved.add_at(trial - point, q2(trial) - q1(point), b - trial);
+  ASSERT_TRUE(moved.add_at(trial - point, q2(trial) - q1(point), b - trial));
   moved.move(d, q1(point) - q1(point + d));
   ASSERT_EQ(moved.count(), 2);
   moved.solve();
   there.add_here(a - point - d);
-  there.add_at(trial - point - d, q2(trial) - q1(point + d), b - trial);
+  ASSERT_TRUE(there.add_at(trial - point - d, q2(trial) - q1(point + d), b - trial));
   there.solve();
   EXPECT_NEAR((moved.step() - there.step()).norm(), 0.0, 1e-3);
   EXPECT_NEAR(moved.fall(), there.fall(), 1e-5 * there.fall());
@@ -83,6 +83,15 @@ TEST(NewtonBundle, APieceThatTheFunctionFallsBelowIsDropped) {
   bundle.add_here(vec(1.0, 0.0));
   bundle.move(vec(0.5, 0.0), 1.0);  // the piece promised 3/8
   EXPECT_EQ(bundle.count(), 0);
+}
+
+TEST(NewtonBundle, APieceAboveTheFunctionAtThePointIsNotKept) {
+  NewtonBundle bundle(2);
+  bundle.add_here(vec(1.0, 0.0));
+  // 0.1 |d|^2 + d_x at d = (-4, 0): it rises by -2.4, its Newton step with curvature 1 is (-0.2, 0).
+  EXPECT_FALSE(bundle.add_at(vec(-4.0, 0.0), -2.4, vec(-0.2, 0.0)));
+  EXPECT_EQ(bundle.count(), 1);
+  EXPECT_TRUE(bundle.add_at(vec(-4.0, 0.0), -8.8 + 1e-12, vec(-0.2, 0.0)));
 }
 
 // No step promises more: the minimum of the model is above that of each of its pieces' mixtures.
@@ -267,12 +276,37 @@ TEST_F(LoadDescentTest, TheMeanOverHypothesesMissesTheDataNoMoreThanTheMostProba
     Descent toy(given, locator, config());
     toy.find(swelling_data(*patient(), given->region, 0.4 * static_cast<double>(seed), seed));
     const double most_probable = toy.misfit(toy.descent.most_probable());
-    ASSERT_TRUE(toy.descent.average(toy.sampled, toy.strengths));
+    ASSERT_EQ(value_or_fail(toy.descent.average(toy.sampled, toy.strengths)), true);
     const double mean = toy.misfit(toy.descent.z());
     pressed = std::max(pressed, toy.descent.contact().size());
     EXPECT_LE(mean, most_probable + kLostByMean + 1e-9);
   }
   EXPECT_GT(pressed, 20) << "the test shows nothing without contact";
+}
+
+TEST_F(LoadDescentTest, WhenTimeIsOverTheLoadsStayWithTheirContact) {
+  const auto locator = std::make_shared<const geometry::TetLocator>(patient()->mesh);
+  Descent toy(operators(Boundary::kContact), locator, config());
+  const SparseData data = swelling_data(*patient(), toy.operators->region, 2.0, 3);
+  toy.find(data);
+  const VecX loads = toy.descent.most_probable();
+  // Far from where the loads are:
+  const SparseData next = swelling_data(*patient(), toy.operators->region, 6.0, 3);
+  toy.sampled.sample(next, RemainderVariances::Ones(), VecX::Constant(data.size(), 0.01));
+  ASSERT_TRUE(toy.descent.take(toy.sampled));
+  const std::vector<int> active = toy.descent.contact().active();
+  ASSERT_FALSE(active.empty());
+  ASSERT_TRUE(
+      toy.strengths.fit(toy.descent.posterior().gram(), toy.descent.posterior().right_hand_side()));
+  toy.limits.out_of_time = [] { return true; };
+  EXPECT_FALSE(value_or_fail(toy.descent.jump(toy.sampled, toy.strengths, toy.limits)));
+  EXPECT_EQ(value_or_fail(toy.descent.descend(toy.sampled, toy.strengths, false, toy.limits)),
+            EstimateStatus::kDeadline);
+  EXPECT_FALSE(value_or_fail(toy.descent.average(toy.sampled, toy.strengths, toy.limits)));
+  EXPECT_EQ(toy.descent.most_probable(), loads);
+  EXPECT_EQ(toy.descent.z(), loads);
+  EXPECT_EQ(toy.descent.contact().active(), active);
+  EXPECT_LE(toy.descent.contact().violation_mm(), kContactViolation_mm);
 }
 
 }  // namespace

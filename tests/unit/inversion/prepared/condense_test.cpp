@@ -12,6 +12,7 @@
 #include "common/inversion/prepared/prepared_model.hpp"
 #include "common/operators/encode_columns.hpp"
 #include "tests/support/results.hpp"
+#include "tests/support/thread_ranks.hpp"
 #include "tests/unit/inversion/condensed_fixture.hpp"
 #include "tests/unit/inversion/toy_inversion.hpp"
 
@@ -32,9 +33,9 @@ TEST(PreparedModel, HoldsWhatItWasMadeFromAndItsTimes) {
                              [&](std::string_view stage, double) { stages.emplace(stage); }));
   EXPECT_EQ(model.boundary(), Boundary::kFixed);
   EXPECT_EQ(&model.model(), patient().get());
-  // Fluid levels in three directions and between sides and ends, bumps of three radii, the brain's
-  // halves, resection, opening.
-  EXPECT_EQ(model.prior().num_modes(), 10 + (27 + 27 + 7) + 4 + 9 + 21);
+  // Fluid levels in three directions and between sides and ends, the tumour's volume, bumps of the
+  // brain's and at its ventricles, resection, opening, tract.
+  EXPECT_EQ(model.prior().num_modes(), 10 + (27 + 27 + 7) + (4 + 6) + 9 + 21 + 15);
   EXPECT_GT(model.timings().factor_nonzeros, 0u);
   EXPECT_GT(model.timings().bytes, 0u);
   EXPECT_GE(model.timings().total_s, model.timings().factor_s);
@@ -299,6 +300,50 @@ TEST_F(Condensed, ProgressRunsFromZeroToOneInEveryStage) {
     EXPECT_EQ(stages[stage].first, 0.0);
     EXPECT_EQ(stages[stage].second, 1.0);
   }
+}
+
+// By processes, with threads in their place: each has a part of the factor, of the columns and of
+// the nodes.
+TEST_F(Condensed, OfSeveralProcessesIsThatOfOne) {
+  const auto one = operators(Boundary::kContact);
+  for (const int processes : {2, 3}) {
+    test_support::run_as_ranks(processes, [&](Ranks& ranks) {
+      auto model = value_or_fail(
+          PreparedModel::prepare(patient(), config(), Boundary::kContact, {}, nullptr, &ranks));
+      const CondensedOperators ops = value_or_fail(condense(std::move(model)));
+      const double scale = one->compliance.cwiseAbs().maxCoeff();
+      EXPECT_LT((ops.compliance - one->compliance).cwiseAbs().maxCoeff(), 1e-11 * scale);
+      EXPECT_EQ(ops.part_columns, one->part_columns);
+      EXPECT_EQ(ops.control, one->control);
+      // Modes may have other signs.
+      const Eigen::MatrixXd modes = ops.region_responses.leftCols(ops.num_modes()).cast<double>();
+      const Eigen::MatrixXd expected =
+          one->region_responses.leftCols(one->num_modes()).cast<double>();
+      const Eigen::MatrixXd covariance = expected * expected.transpose();
+      EXPECT_LT((modes * modes.transpose() - covariance).norm(), 1e-5 * covariance.norm());
+      EXPECT_LT((ops.truncated_variance_mm2 - one->truncated_variance_mm2).norm(),
+                1e-5 * one->truncated_variance_mm2.norm());
+      if (ranks.rank() > 0) {
+        EXPECT_EQ(ops.responses.num_nodes(), 0);
+        return;
+      }
+      const Eigen::MatrixXd columns =
+          rows_of(ops, all_nodes(ops), ops.contact_column(0), ops.num_slaves());
+      const Eigen::MatrixXd wanted =
+          rows_of(*one, all_nodes(*one), one->contact_column(0), one->num_slaves());
+      EXPECT_LT((columns - wanted).cwiseAbs().maxCoeff(), kFloat * wanted.cwiseAbs().maxCoeff());
+    });
+  }
+}
+
+TEST(PreparedModel, MoreProcessesThanTheMeshHasPartsAreRefusedWithBothNumbers) {
+  const int nodes = patient()->mesh.num_nodes();
+  test_support::ThreadWorld world(2 * nodes);
+  test_support::ThreadRanks ranks(world, 0);
+  EXPECT_THAT(refusal_of(PreparedModel::prepare(patient(), test_support::toy_config(),
+                                                Boundary::kContact, {}, nullptr, &ranks),
+                         ErrorCode::kInvalidArgument),
+              HasSubstr("cut into " + std::to_string(nodes) + " parts"));
 }
 
 }  // namespace

@@ -84,10 +84,11 @@ int changes(const CondensedOperators& brain, const ContactReduction& model, cons
 }
 
 struct Skull {
-  explicit Skull(bool with_contact = true)
-      : contact(brain, kWindow, kBeta, with_contact, system, team),
+  explicit Skull(bool with_contact = true, double gap_mm = 0.5)
+      : brain(skull_operators(gap_mm)),
+        contact(brain, kWindow, kBeta, with_contact, system, team),
         reach(brain, kWindow, kBeta, with_contact, model, team) {}
-  CondensedOperators brain = skull_operators(0.5);
+  CondensedOperators brain;
   ThreadTeam team{2};
   ContactSystem system{brain, kWindow, kBeta, team};
   ContactReduction model{brain, kWindow, system, team};
@@ -95,14 +96,19 @@ struct Skull {
   ContactReach reach;
 };
 
-TEST(ContactReach, EndsWhereSoManySlavesOfTheLinearModelHaveChanged) {
-  Skull skull;
+// Without a gap most slaves press.
+class ContactReachOf : public testing::TestWithParam<double> {};
+INSTANTIATE_TEST_SUITE_P(Gaps, ContactReachOf, testing::Values(0.5, -12.0));
+
+TEST_P(ContactReachOf, EndsWhereSoManySlavesOfTheLinearModelHaveChanged) {
+  Skull skull(true, GetParam());
   auto& [brain, team, system, model, contact, reach] = skull;
   int shortened = 0;
   for (std::uint64_t seed = 1; seed <= 6; ++seed) {
     const VecX z = skull_loads(seed, 0.5), step = skull_loads(seed + 20, 2.0);
     ASSERT_TRUE(contact.solve(z));
     ASSERT_TRUE(model.activate(contact.set()));
+    ASSERT_EQ(model.size() > kSlaves / 2, GetParam() < 0.0);
     ASSERT_EQ(changes(brain, model, z), 0);
     for (const int most : {0, 3, 20, kSlaves}) {
       const double t = reach.along(step, contact.penetration(), most);
@@ -240,6 +246,24 @@ TEST(ContactAtLoads, SolvesContactWhereExchangesGoInCircles) {
     longest = std::max(longest, search.at_loads.sets());
   }
   EXPECT_GT(longest, ContactAtLoads::kPlainSets) << "the test shows nothing";
+}
+
+TEST(ContactAtLoads, ASearchThatIsGivenUpLeavesTheSolutionThatItKept) {
+  const CondensedOperators brain = skull_operators(0.5);
+  Search search(brain);
+  const VecX z = skull_loads(6, 1.0), other = skull_loads(7, 3.0);
+  ASSERT_EQ(value_or_fail(search.at_loads.solve(z)), true);
+  search.at_loads.keep();
+  const std::vector<int> active = search.at_loads.active();
+  int asked = 0;
+  const auto third = [&asked] { return ++asked > 2; };
+  EXPECT_FALSE(value_or_fail(search.at_loads.solve(other, third)));
+  EXPECT_EQ(search.at_loads.sets(), 2);
+  search.at_loads.return_to_kept();
+  EXPECT_EQ(search.at_loads.active(), active);
+  expect_solution(brain, z, search.at_loads);
+  EXPECT_TRUE(value_or_fail(search.at_loads.solve(other)));
+  expect_solution(brain, other, search.at_loads);
 }
 
 TEST(ContactAtLoads, ReturnsToTheSolutionThatItKept) {

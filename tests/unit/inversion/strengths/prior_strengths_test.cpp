@@ -291,7 +291,7 @@ TEST(PriorStrengths, StrengthsThatAreNotEstimatedStayAsInTheCase) {
   expect_moments_of_the_mixture(problem, result);
 }
 
-// Of a strength before the data, absence among them.
+// Before the data, of a part that is there.
 double root_mean_square_of_strength() {
   double sum = 0.0, squares = 0.0;
   for (std::size_t i = 1; i < kStrengths.size(); ++i) {
@@ -299,7 +299,7 @@ double root_mean_square_of_strength() {
     sum += p;
     squares += p * kStrengths[i] * kStrengths[i];
   }
-  return std::sqrt(kAbsent * squares / sum);
+  return std::sqrt(squares / sum);
 }
 
 TEST(PriorStrengths, TheBroadHypothesisKeepsItsWeightWhateverTheDataSay) {

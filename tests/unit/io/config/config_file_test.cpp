@@ -228,6 +228,29 @@ TEST(CaseFile, StiffnessOfTissuesIsReadAndWritten) {
   }
 }
 
+TEST(CaseFile, AnatomyIsReadAndWritten) {
+  EXPECT_FALSE(value_or_fail(parse(kMinimal)).anatomy.labels);
+  const std::string text = std::string(kMinimal) +
+                           "material: {tissues: {brainstem: 2.5}}\n"
+                           "anatomy: {labels: maps/aseg.mgz, numbers: aal, septa: off, "
+                           "septum_gap_mm: 0.25}\n";
+  const auto read = value_or_fail(parse(text));
+  const auto again = value_or_fail(parse(case_config_text(read)));
+  for (const CaseConfig& config : {read, again}) {
+    EXPECT_EQ(config.anatomy.labels, fs::path("/cases/maps/aseg.mgz"));
+    EXPECT_EQ(config.anatomy.numbers, LabelNumbers::kAal);
+    EXPECT_TRUE(config.anatomy.tissues);
+    EXPECT_FALSE(config.anatomy.septa);
+    EXPECT_TRUE(config.anatomy.ventricles);
+    EXPECT_EQ(config.anatomy.septum_gap_mm, 0.25);
+    EXPECT_EQ(config.material.tissues.brainstem, 2.5);
+    EXPECT_EQ(config.material.tissues.white_matter, TissueRatios{}.white_matter);
+  }
+  EXPECT_THAT(sentence_of(parse(std::string(kMinimal) + "mesh: {file: h.msh}\n"
+                                                        "anatomy: {labels: aseg.mgz}\n")),
+              testing::HasSubstr("anatomy.labels: needs a mesh that is generated (mesh.generate)"));
+}
+
 TEST(CaseFile, BadFilesAreRefusedInOneLineThatNamesFileLineKeyAndValue) {
   expect_edits_refused(
       parse, kFull,

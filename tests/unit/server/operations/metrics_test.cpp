@@ -131,6 +131,7 @@ TEST(Metrics, EveryFamilyHasHelpATypeAndAUnitInItsName) {
                                               "brainshift_model_ready",
                                               "brainshift_worker_hangs",
                                               "brainshift_session_phase",
+                                              "brainshift_field_aged",
                                               "brainshift_clients",
                                               "brainshift_viewers",
                                               "brainshift_viewers_behind",
@@ -163,6 +164,16 @@ TEST(Metrics, HistogramsAreCumulativeAndAgreeWithTheirCount) {
   EXPECT_EQ(bucket("+Inf"), 4.0);
   EXPECT_EQ(read.value("brainshift_stage_seconds_count{stage=\"total\"}"), 4.0);
   EXPECT_NEAR(read.value("brainshift_stage_seconds_sum{stage=\"total\"}"), 200.03015, 1e-4);
+}
+
+TEST(Metrics, SayWhetherTheFieldIsAgedOrHasExpired) {
+  wire::DaemonReport report = sample_report();
+  report.session.aged_after_ms = 2000;
+  report.session.expired_after_ms = 4000;
+  for (const double state : {0.0, 1.0, 2.0}) {
+    report.session.age_ms = 1000.0 + 2000.0 * state;
+    EXPECT_EQ(exposition_of(report).value("brainshift_field_aged"), state);
+  }
 }
 
 TEST(Metrics, WhatIsNotThereIsLeftOut) {

@@ -205,7 +205,7 @@ TEST_F(SceneSession, ByDefaultOnlyPressureIsLeftOutWhenTheBrainTouches) {
   std::vector<std::string> parts;
   for (const Omission& one : update.left_out) parts.push_back(one.part);
   const std::vector<Omission> off = pipeline::prior_omissions(config().prior);
-  ASSERT_EQ(off.size(), 6u);
+  ASSERT_EQ(off.size(), 7u);
   EXPECT_THAT(parts, testing::Contains("pressure"));
   EXPECT_EQ(parts.size(), 1 + off.size());
   for (const Omission& one : off) EXPECT_THAT(parts, testing::Contains(one.part));

@@ -190,6 +190,22 @@ TEST_F(HubOnLoopback, TurnsAwayMoreClientsThanItHasRoomFor) {
   EXPECT_EQ(first_voxel(first.receive_from("brainshift_u")), 2.0F);
 }
 
+TEST_F(HubOnLoopback, AClientThatDoesNotReadMakesRoomForOneThatDoes) {
+  HubOptions options;
+  options.max_peers = 1;
+  options.unread = std::chrono::milliseconds(50);
+  serve(options);
+  hub->post(picture(1, 160), Broadcast::Part::kWhole);  // 49 MB: more than its sockets hold
+  IgtlPeer idle = IgtlPeer::connect(hub->address().port, 4096);
+  std::optional<test_support::Received> shown;
+  const auto deadline = std::chrono::steady_clock::now() + IgtlPeer::kLimit;
+  while (!shown && std::chrono::steady_clock::now() < deadline) {
+    IgtlPeer reader = client();  // nothing comes where it is turned away
+    shown = reader.receive_from("brainshift_u");
+  }
+  EXPECT_EQ(first_voxel(shown), 1.0F);
+}
+
 TEST_F(HubOnLoopback, AClientThatTalksNonsenseIsClosedAndTheOthersGoOn) {
   serve();
   IgtlPeer good = client();

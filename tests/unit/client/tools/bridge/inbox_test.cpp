@@ -14,6 +14,7 @@
 #include "common/geometry/surface.hpp"
 #include "common/igtl/poly_data.hpp"
 #include "tests/support/results.hpp"
+#include "tests/support/study_record.hpp"
 #include "tests/support/temporary_folder.hpp"
 #include "tests/support/virtual_sweep.hpp"
 
@@ -229,17 +230,29 @@ class InboxSweep : public testing::Test {
       for (int column = 0; column < 4; ++column) stream >> matrix(row, column);
     return matrix.topRows<3>().cast<float>();
   }
+  // What goes wrong on the way, by frame.
+  struct Stream {
+    std::set<int> lost = {};      // the image does not come
+    std::set<int> coloured = {};  // it has three components
+    std::set<int> twice = {};     // it comes twice
+    std::set<int> behind = {};    // it comes behind the next frame's transforms
+    int end = 1 << 30;            // the sender stops in front of this frame
+    milliseconds since{0};        // when its first frame comes, after kInboxBegin
+  };
   // The messages of all frames; the last one's time.
-  // left_out: frames whose image does not come.
-  Inbox::TimePoint play(Inbox& inbox, const std::set<int>& left_out = {}) {
+  Inbox::TimePoint play(Inbox& inbox) { return play(inbox, Stream{}); }
+  Inbox::TimePoint play(Inbox& inbox, const Stream& stream) {
     const auto content = sweep.content();
     const std::size_t bytes = static_cast<std::size_t>(sweep.width * sweep.height);
     Inbox::TimePoint now = kInboxBegin;
+    std::vector<igtl::Message> late;
     for (std::size_t frame = 0; frame < content.frames.size(); ++frame) {
-      now = kInboxBegin + milliseconds(100 * static_cast<int>(frame));
-      const auto time = igtl::to_timestamp(milliseconds(5000 + 100 * static_cast<int>(frame)));
+      const int number = static_cast<int>(frame);
+      if (number >= stream.end) break;
+      now = kInboxBegin + stream.since + milliseconds(100 * number);
+      const auto time = igtl::to_timestamp(milliseconds(5000 + 100 * number));
       const auto send = [&](igtl::Message made) {
-        made.envelope.timestamp = time;
+        if (made.envelope.timestamp == 0) made.envelope.timestamp = time;
         const Taken taken = inbox.take(made, now);
         EXPECT_THAT(taken.found, IsEmpty()) << "a sweep ends with a gap";
         EXPECT_THAT(taken.notes, IsEmpty());
@@ -249,9 +262,21 @@ class InboxSweep : public testing::Test {
       const auto* pixels =
           reinterpret_cast<const std::uint8_t*>(content.pixels.data()) + frame * bytes;
       image.voxels = std::vector<std::uint8_t>(pixels, pixels + bytes);
-      if (!left_out.contains(static_cast<int>(frame))) {
-        send(inbox_message("Image_Reference", image));
+      if (stream.coloured.contains(number)) {
+        image.components = 3;
+        image.voxels = std::vector<std::uint8_t>(3 * bytes, 7);
       }
+      std::vector<igtl::Message> images;
+      if (!stream.lost.contains(number)) {
+        images.assign(stream.twice.contains(number) ? 2 : 1,
+                      inbox_message("Image_Reference", image));
+      }
+      if (stream.behind.contains(number)) {
+        for (igtl::Message& made : images) made.envelope.timestamp = time;
+        late.insert(late.end(), images.begin(), images.end());
+        images.clear();
+      }
+      for (const igtl::Message& made : images) send(made);
       for (const auto& [name, value] : content.frames[frame]) {
         constexpr std::string_view kEnd = "Transform";
         if (!name.ends_with(kEnd)) continue;
@@ -261,6 +286,8 @@ class InboxSweep : public testing::Test {
             {"TransformStatus", content.frames[frame].at(name + "Status")});
         send(transform);
       }
+      if (stream.behind.contains(number)) continue;
+      for (const igtl::Message& made : std::exchange(late, {})) send(made);
     }
     return now;
   }
@@ -297,27 +324,53 @@ TEST_F(InboxSweep, TheNextSweepEndsTheOneBeforeAndCountsItsOwnImages) {
   EXPECT_THAT(taken.found, SizeIs(1));
 }
 
-// Images are skipped, or the bridge connects late: no contour comes to lie on another image.
-TEST_F(InboxSweep, AContourWithoutItsImageIsLeftOutAndNoOtherMoves) {
+// Images are skipped, in colour, twice or late; the bridge connects late; the sender stops and
+// begins anew: no contour comes to lie on another image.
+TEST_F(InboxSweep, In200RandomStreamsEveryContourIsOnItsOwnImage) {
   write_contours();
-  for (std::uint32_t seed = 0; seed < 40; ++seed) {
+  constexpr std::uint32_t kStreams = 200;
+  int wrong = 0, contours = 0;
+  const auto look = [&](const Taken& taken) {
+    for (const Found& found : taken.found) {
+      const Points& boundary = std::get<TumourBoundary>(found.body).points;
+      contours += static_cast<int>(boundary.cols()) / 90;
+      for (Eigen::Index i = 0; i < boundary.cols(); ++i) {
+        wrong += std::abs(sweep.distance_mm(boundary.col(i))) < 0.02 ? 0 : 1;
+      }
+    }
+  };
+  for (std::uint32_t seed = 0; seed < kStreams; ++seed) {
     std::mt19937 random(seed);
-    const auto begin = static_cast<int>(random() % 8);
-    std::set<int> lost;
-    for (int frame = 0; frame < sweep.frames; ++frame) {
-      if (frame < begin || random() % 5 == 0) lost.insert(frame);
-    }
+    const auto draw = [&](int connected_at) {
+      Stream stream;
+      for (int frame = 0; frame < sweep.frames; ++frame) {
+        if (frame < connected_at || random() % 5 == 0) stream.lost.insert(frame);
+        if (random() % 8 == 0) stream.coloured.insert(frame);
+        if (random() % 8 == 0) stream.twice.insert(frame);
+        if (random() % 8 == 0) stream.behind.insert(frame);
+      }
+      return stream;
+    };
     Inbox inbox = Inbox::open(options).value();
-    const auto last = play(inbox, lost);
-    const Taken taken = inbox.tick(last + milliseconds(2100));
-    ASSERT_THAT(taken.found, SizeIs(1)) << testing::PrintToString(taken.notes);
-    const Points& boundary = std::get<TumourBoundary>(taken.found[0].body).points;
-    for (Eigen::Index i = 0; i < boundary.cols(); ++i) {
-      EXPECT_LT(std::abs(sweep.distance_mm(boundary.col(i))), 0.02);
+    Stream stream = draw(static_cast<int>(random() % 8));
+    if (seed % 4 == 0) {
+      stream.end = 8 + static_cast<int>(random() % 10);
+      const auto stopped = play(inbox, stream);
+      look(inbox.tick(stopped + milliseconds(2100)));
+      stream = draw(0);
+      stream.since =
+          std::chrono::duration_cast<milliseconds>(stopped - kInboxBegin) + milliseconds(2500);
     }
-    EXPECT_THAT(taken.found[0].told,
-                HasSubstr(fmt::format("sweep of {} images", sweep.frames - lost.size())));
+    look(inbox.tick(play(inbox, stream) + milliseconds(2100)));
   }
+  EXPECT_GT(contours, 8 * static_cast<int>(kStreams));
+  EXPECT_TRUE(test_support::record_check("streams", "streams", kStreams, "= 200", true,
+                                         "unit_tools_bridge --gtest_filter=InboxSweep.In200*"));
+  test_support::record_figure("streams", "contours that were used", contours, "shown",
+                              "unit_tools_bridge --gtest_filter=InboxSweep.In200*");
+  EXPECT_TRUE(test_support::record_check("streams", "boundary points on another image", wrong,
+                                         "= 0", wrong == 0,
+                                         "unit_tools_bridge --gtest_filter=InboxSweep.In200*"));
 }
 
 TEST_F(InboxSweep, BehindAClockThatRanBackNothingIsUsedUpToAPause) {

@@ -101,6 +101,13 @@ TEST(ShownState, TheStatusIsOkForACurrentUsableFieldAlone) {
     EXPECT_EQ(to_status(state).text, "no word");
     EXPECT_TRUE(igtl::validate(to_status(state)));
   }
+  ShownState good = current();
+  good.quality = "good";
+  EXPECT_EQ(to_status(good).text, "");
+  ShownState caution = current();
+  caution.flags = "deadline";
+  EXPECT_EQ(to_status(caution).code, igtl::kStatusOk);
+  EXPECT_EQ(to_status(caution).text, "caution: deadline");
   ShownState recorded = current();
   recorded.recorded = true;
   EXPECT_EQ(to_status(recorded).code, igtl::kStatusNotReady);

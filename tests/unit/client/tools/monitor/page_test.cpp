@@ -160,10 +160,11 @@ TEST(Summary, IsOneLineWithPhaseAgeRateLatencyAndJournal) {
   DaemonReport now = before;
   now.uptime_ms += 1000;
   now.usable += 30;
-  EXPECT_EQ(summary({now, before}),
-            "tracking, field 0.2 s old, condensed, contact, 30.0 updates/s, total p50 31.50 p95 "
-            "40.25 p99 55.00 max "
-            "90.12 ms, recording");
+  EXPECT_EQ(
+      summary({now, before}),
+      "tracking, field 0.2 s old, condensed, contact, model 0123456789abcdef, 30.0 updates/s, "
+      "total p50 31.50 p95 40.25 p99 55.00 max "
+      "90.12 ms, recording");
 }
 
 TEST(DurationText, IsShortAndWithinItsLastDigit) {

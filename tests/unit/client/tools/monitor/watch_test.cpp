@@ -4,6 +4,7 @@
 #include <cmath>
 #include <mutex>
 #include <nlohmann/json.hpp>
+#include <sstream>
 
 #include "client/tools/monitor/watch.hpp"
 #include "common/wire/frame.hpp"
@@ -42,8 +43,8 @@ TEST(ChoiceText, NamesWhatItCannotRead) {
   expect({.region = "nan,0,0:1mm"}, "choice.ball.centre_mm = nan: must be a number");
 }
 
+using testing::AllOf;
 using testing::ElementsAre;
-using testing::EndsWith;
 using testing::HasSubstr;
 using testing::Not;
 using testing::StartsWith;
@@ -60,24 +61,6 @@ UpdateMessage update(std::uint64_t sequence, int nodes) {
   return message;
 }
 
-TEST(Watch, TumourNodesAreTheOnesInsideIt) {
-  const BrainModel model = test_support::toy_patient(12);
-  const auto nodes = tumour_nodes(model);
-  EXPECT_GT(nodes.size(), 20u);
-  for (const NodeIndex node : nodes) {
-    EXPECT_LE((model.mesh.nodes.col(node) - Vec3(30, 30, 40)).norm(), 10.001);
-  }
-}
-
-TEST(Watch, TheTumoursMotionIsThatOfItsNodesAmongThePart) {
-  UpdateMessage message = update(4, 3);
-  message.update.estimate.displacement << 3, 0, 9, 4, 0, 9, 0, 1, 9;
-  EXPECT_DOUBLE_EQ(*watched(message, {0, 1}, 3).tumour_mm, 3.0);  // 5 and 1 mm
-  message.update.part = FieldPart{100, {7, 20, 30}, 0};
-  EXPECT_DOUBLE_EQ(*watched(message, {20, 50}, 100).tumour_mm, 1.0);
-  EXPECT_EQ(watched(message, {0, 1, 2}, 100).tumour_mm, std::nullopt);
-}
-
 TEST(Watch, ALineTellsWhatTravelledAndWhetherItIsCurrent) {
   UpdateMessage message = update(12, 3);
   message.update.part = FieldPart{100, {7, 20, 30}, 0};
@@ -86,15 +69,16 @@ TEST(Watch, ALineTellsWhatTravelledAndWhetherItIsCurrent) {
   WatchedUpdate told = watched(message, {20}, 100);
   told.status = {Currency::kCurrent, "", 0.08};
   EXPECT_EQ(watch_line(told, false),
-            "update 12  age 0.08 s  3 of 100 nodes (2 sent, 7.1 kB)  tumour 0.00 mm  "
-            "condensed, contact, good, current");
+            "update 12  0.08 s old  tumour 0.00 mm  good, contact, current\n"
+            "  3 of 100 nodes (2 sent, 7.1 kB)");
   told.status = {Currency::kStale, "no word", std::nan("")};
-  told.tumour_mm.reset();
+  told.tumour.reset();
   EXPECT_EQ(watch_line(told, false),
-            "update 12  age unknown  3 of 100 nodes (2 sent, 7.1 kB)  no tumour node  "
-            "condensed, contact, good, stale: no word");
+            "update 12  age unknown  no tumour node  good, contact, stale\n  stale: no word\n"
+            "  3 of 100 nodes (2 sent, 7.1 kB)");
   told.status = {Currency::kAged, "35 s old", 35.0, true};
-  EXPECT_THAT(watch_line(told, false), EndsWith("good, aged, RECORDED: 35 s old"));
+  EXPECT_THAT(watch_line(told, false),
+              HasSubstr("good, contact, aged, RECORDED\n  aged: 35 s old"));
   EXPECT_EQ(nlohmann::json::parse(watch_line(told, true)).at("recorded"), true);
   told.status = {Currency::kStale, "no word", std::nan("")};
   const auto said = nlohmann::json::parse(watch_line(told, true));
@@ -105,12 +89,29 @@ TEST(Watch, ALineTellsWhatTravelledAndWhetherItIsCurrent) {
   EXPECT_EQ(said.at("received_nodes"), 2);
 }
 
+TEST(Watch, NoLineIsWiderThanATerminalAndReasonsAreWhole) {
+  UpdateMessage message = update(4321, 2);
+  QualityVerdict& verdict = message.update.estimate.quality;
+  verdict.quality = Quality::kCaution;
+  for (int i = 0; i < 40; ++i) verdict.reason += "word" + std::to_string(i) + " ";
+  message.update.estimate.displacement = Points::Constant(3, 2, 12.345);
+  message.update.estimate.sd_mm = VecX::Constant(2, 0.5);
+  WatchedUpdate told = watched(message, {0, 1}, 2);
+  told.status = {Currency::kSuperseded, "a newer update has come", 123.456, true};
+  const std::string text = watch_line(told, false);
+  EXPECT_THAT(text,
+              StartsWith("update 4321  123.46 s old  tumour 21.38 ± 0.50 mm  caution, contact"));
+  std::istringstream lines(text);
+  for (std::string line; std::getline(lines, line);) EXPECT_LE(line.size(), 81u) << line;  // ± is 2
+  EXPECT_THAT(text, AllOf(HasSubstr("caution: word0 "), HasSubstr("word39")));
+}
+
 TEST(Watch, ALateAnswerIsMarked) {
   UpdateMessage message = update(12, 3);
   message.update.answer_time = {250.0, 50.0};
   WatchedUpdate told = watched(message, {}, 3);
   EXPECT_THAT(watch_line(told, false),
-              EndsWith("  LATE: answered 250 ms after its observation came, usually 50 ms"));
+              HasSubstr("\n  LATE: answered 250 ms after its observation came, usually 50 ms"));
   EXPECT_EQ(nlohmann::json::parse(watch_line(told, true)).at("late"), true);
   message.update.answer_time = {100.0, 50.0};
   told = watched(message, {}, 3);
@@ -122,7 +123,7 @@ TEST(Watch, AFailureSaysWhy) {
   UpdateMessage message = update(5, 0);
   message.error = Error{ErrorCode::kEmptySet, "no point is inside the brain"};
   EXPECT_THAT(watch_line(watched(message, {}, 3), false),
-              HasSubstr("no field: no point is inside the brain"));
+              HasSubstr("no field, none\n  no point is inside the brain"));
 }
 
 // A daemon of the toy patient that sends what was chosen once it is subscribed to.
@@ -159,7 +160,7 @@ TEST(Watch, SubscribesWithTheChoiceAndEndsAfterItsCount) {
   const Status status = watch({.endpoint = daemon.endpoint(), .choice = choice, .count = 1},
                               [&](const std::string& line) { lines.push_back(line); });
   ASSERT_TRUE(status) << status.error().message;
-  EXPECT_THAT(lines, ElementsAre(StartsWith("update 1  age ")));
+  EXPECT_THAT(lines, ElementsAre(StartsWith("update 1  ")));
   EXPECT_THAT(lines.front(), HasSubstr("2 of 216 nodes (2 sent"));
   const std::lock_guard lock(mutex);
   EXPECT_EQ(subscriptions.front().choice, choice);

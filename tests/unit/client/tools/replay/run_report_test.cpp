@@ -38,6 +38,10 @@ RunReport full_run() {
   run.error_mm.initial = MeanStd{2.9, 0.67};
   run.error_mm.cross = MeanStd{0.11, 0.07};
   run.recovery_pct = 96.2;
+  run.tumour_shift_mm = TumourShift{2.3, std::nullopt};
+  run.course = {{1.5, "ius", "caution", "a", 2.3, 0.2, std::nullopt, 0.3, 80.0}};
+  run.leave_one_out = {
+      {"tracks", "landmarks", 13, 1, {5.8, 1}, MeanStd{1.7, 0.5}, {1.6, 0.7}, 0.9}};
   run.field_error_pct = FieldError{1, 5, 9};
   run.contact = ContactSummary{400, 3, 0.04, 6};
   run.principal_direction_deg = 3.1;

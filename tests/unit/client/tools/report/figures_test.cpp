@@ -46,10 +46,33 @@ TEST(Figures, OfAGroupShowEveryPictureThatItsDataAllow) {
   ASSERT_EQ(figures.size(), 7u);
   EXPECT_EQ(figures[4].file_name, "known-a-b-c.png");
   EXPECT_LT(figures[4].image.cols, figures[6].image.cols) << "of the run that tells it alone";
+  runs[0].field->sd_mm = VecX::Constant(box_mesh().num_nodes(), 0.2);
+  figures = slice_figures(groups[0], runs, head);
+  ASSERT_EQ(figures.size(), 8u);
+  EXPECT_EQ(figures[4].file_name, "sd-a-b-c.png");
   for (ReportedRun& run : runs) run.field->truth.reset();
-  EXPECT_EQ(slice_figures(groups[0], runs, head).size(), 5u);
+  EXPECT_EQ(slice_figures(groups[0], runs, head).size(), 6u);
   for (ReportedRun& run : runs) run.field.reset();
   EXPECT_TRUE(slice_figures(groups[0], runs, head).empty());
+}
+
+TEST(Figures, OfACourseAreAStripPerQuantityThatItHasWithTheTruthWhereRecorded) {
+  RunReport run;
+  const RunGroup group{"g", 0, std::nullopt};
+  run.course.resize(2);
+  EXPECT_TRUE(course_figures(group, run).empty());
+  for (CoursePoint& point : run.course) {
+    point = {point.time_s, "ius",        "caution",    "why <so>", 2.5,
+             0.25,         std::nullopt, std::nullopt, 80.0};
+  }
+  run.course[1].time_s = 300.0;
+  auto strips = course_figures(group, run);
+  ASSERT_EQ(strips.size(), 2u);
+  EXPECT_THAT(strips[0].svg, HasSubstr("(min): 5"));
+  EXPECT_THAT(strips[0].svg, HasSubstr("2.5 ± 0.25\nius, caution: why &lt;so&gt;"));
+  EXPECT_THAT(strips[1].svg, HasSubstr("time of the update (ms): 80"));
+  for (CoursePoint& point : run.course) point.true_tumour_mm = 2.6;
+  EXPECT_THAT(course_figures(group, run)[0].svg, HasSubstr("true: 2.6"));
 }
 
 constexpr double kSide_mm = 60.0;

@@ -15,6 +15,14 @@ namespace {
 using testing::HasSubstr;
 using testing::Not;
 
+// How often `part` occurs in `text`.
+int count(const std::string& text, const std::string& part) {
+  int found = 0;
+  for (std::size_t at = text.find(part); at != std::string::npos; at = text.find(part, at + 1))
+    ++found;
+  return found;
+}
+
 TEST(Html, EscapesWhatReportsSay) {
   EXPECT_EQ(escape_html("a<b>&\"c'"), "a&lt;b&gt;&amp;&quot;c&#39;");
   ReportedRun run{small_run("contact"), std::nullopt};
@@ -39,6 +47,7 @@ TEST(Html, PageSaysWhatItIsNotForAndCitesThePaper) {
 TEST(Html, PageOpensWithTheVerdict) {
   const ReportedRun run{small_run("contact"), std::nullopt};
   const std::string page = html_page({run}, group_runs({run}), {});
+  EXPECT_LT(page.find("93.8 % recovered"), page.find("<h2>"));
   EXPECT_LT(page.find("recovered 93.8 %"), page.find("<h2>"));
 }
 
@@ -54,6 +63,7 @@ TEST(Html, ASlideHasAButtonAndAnImagePerPositionAndShowsTheEstimateFirst) {
   EXPECT_THAT(page, HasSubstr("&lt;truth&gt;"));
   EXPECT_THAT(page, Not(HasSubstr("<script")));
   EXPECT_THAT(page, Not(HasSubstr("http")));
+  EXPECT_EQ(count(page, "data:image/webp;"), 6);
 }
 
 RunReport doubtful_run() {
@@ -105,11 +115,12 @@ TEST(QualityTable, ShowsStrengthsAndTheMostProbableHypotheses) {
   EXPECT_THAT(table, Not(HasSubstr("9.00")));
 }
 
-TEST(QualityTable, OfAReportWithoutQualityHasDashes) {
+TEST(QualityTable, ARowThatNoRunHasIsLeftOut) {
   RunReport old = small_run("contact");
   old.quality.reset();
-  const std::string table = quality_table({{old, std::nullopt}});
-  EXPECT_THAT(table, HasSubstr("<th>worst update</th><td>&ndash;</td>"));
+  EXPECT_THAT(quality_table({{old, std::nullopt}}), Not(HasSubstr("worst update")));
+  EXPECT_THAT(quality_table({{old, std::nullopt}, {small_run("fixed"), std::nullopt}}),
+              HasSubstr("<th>worst update</th><td>&ndash;</td>"));
 }
 
 TEST(QualityTable, StandsOnThePageInBothSchemes) {
@@ -125,14 +136,6 @@ TEST(QualityTable, StandsOnThePageInBothSchemes) {
 }
 
 std::vector<ReportedRun> one(RunReport run) { return {{std::move(run), std::nullopt}}; }
-
-// How often `part` occurs in `text`.
-int count(const std::string& text, const std::string& part) {
-  int found = 0;
-  for (std::size_t at = text.find(part); at != std::string::npos; at = text.find(part, at + 1))
-    ++found;
-  return found;
-}
 
 TEST(ErrorTable, HasAColumnPerRunAndThreeOfThePaper) {
   std::vector<ReportedRun> runs = one(small_run("contact"));
@@ -193,7 +196,7 @@ TEST(Verdict, NamesTheRangeAndTheLeastBesideThePaper) {
   EXPECT_THAT(text, HasSubstr("method condensed recovered 81.5 to 97.2 %"));
   EXPECT_THAT(text, HasSubstr("least in joint-mixed: 2.00 mm before, 0.12 mm after"));
   EXPECT_THAT(text, HasSubstr("85 % in its five patients"));
-  EXPECT_THAT(text, HasSubstr("90 to 150 ms, 3.0 to 5.0 times one solve"));
+  EXPECT_THAT(text, HasSubstr("90 ms to 150 ms, 3.0 to 5.0 times one solve"));
   EXPECT_THAT(text, HasSubstr("none of 3 updates was unusable"));
 }
 
@@ -208,18 +211,91 @@ TEST(Verdict, SpeaksOfTheDefaultMethodWithContactWhereThereIsOne) {
               HasSubstr("Without brain-skull contact, method condensed recovered 10.0 %"));
 }
 
-TEST(Verdict, SaysWhatIsUnknownAndWhatIsUnusable) {
-  ReportedRun run = condensed("live", 0.0);
-  run.report.recovery_pct.reset();
+TEST(Verdict, SaysNothingWithoutATruthAndCountsWhatIsUnusable) {
+  ReportedRun run = condensed("live", 90.0);
   run.report.latency_ms.reset();
   run.report.updates = 4;
   run.report.quality->counts.unusable = 2;
-  const std::string text = verdict({run});
-  EXPECT_THAT(text, HasSubstr("because no truth was recorded"));
-  EXPECT_THAT(text, HasSubstr("2 of 4 updates were unusable"));
-  EXPECT_THAT(text, Not(HasSubstr("ms")));
-  run.report.updates = 0;
-  EXPECT_THAT(verdict({run}), HasSubstr("no update came"));
+  EXPECT_THAT(verdict({run}), HasSubstr("2 of 4 updates were unusable"));
+  EXPECT_THAT(verdict({run}), Not(HasSubstr("ms")));
+  run.report.recovery_pct.reset();
+  EXPECT_EQ(verdict({run}), "");
+}
+
+// A real surgery: landmarks, no truth.
+RunReport real_run() {
+  RunReport run;
+  run.case_id = run.scenario = "resect-1";
+  run.method = "condensed";
+  run.boundary = "contact";
+  run.mesh = {100, 300, 20};
+  run.updates = 1;
+  run.quality = RunQuality{
+      "caution",       "caution", "the data say little (0.31)", {0, 1, 0, 0}, {{"mostly_prior", 1}},
+      {"mostly_prior"}};
+  run.tumour_shift_mm = TumourShift{2.34, 0.21};
+  run.error_mm.sparse = MeanStd{0.3, 0.1};
+  run.latency_ms = LatencyPercentiles{87.4, 87.4, 87.4, 87.4};
+  run.course = {{0.0, "tracks", "caution", "", 2.34, 0.21, std::nullopt, 0.3, 87.4}};
+  run.leave_one_out = {
+      {"tracks", "landmarks", 13, 0, {5.8, 1.0}, MeanStd{1.75, 0.5}, {1.6, 0.7}, 0.875}};
+  run.sources = {{"tracks", 1, 0.0, 13, 1}};
+  return run;
+}
+
+TEST(Headline, OfARealSurgeryStatesMotionErrorReasonAndWhatToDo) {
+  const std::string text = headline(real_run());
+  EXPECT_THAT(text, HasSubstr("<strong>2.3&nbsp;&plusmn;&nbsp;0.2&nbsp;mm</strong>; misfit 0.30"));
+  EXPECT_THAT(text, HasSubstr("caution</span> because the data say little (0.31)."));
+  EXPECT_THAT(text,
+              HasSubstr("13 landmarks of tracks were left out and predicted from the rest to "
+                        "1.6 mm, from 5.8 mm without correction; a rigid fit comes to 1.8 mm"));
+  EXPECT_THAT(text, HasSubstr("Next:</strong> measure more"));
+  EXPECT_THAT(text, Not(HasSubstr("truth")));
+}
+
+TEST(Headline, OfASimulatedSurgeryHasTheTruthBesideIt) {
+  EXPECT_THAT(
+      headline(small_run("contact")),
+      HasSubstr("it moved 2.00&nbsp;mm, of which 0.12&nbsp;mm are left (93.8 % recovered)"));
+}
+
+TEST(Headline, SaysThatNoUpdateCouldBeUsed) {
+  RunReport run = real_run();
+  run.quality->last = "unusable";
+  run.quality->last_flags = {"inverted_elements"};
+  EXPECT_THAT(headline(run), HasSubstr("the figures are of the last usable one"));
+  run.error_mm.sparse.reset();
+  EXPECT_THAT(headline(run), HasSubstr("there is no field"));
+  EXPECT_THAT(headline(run), HasSubstr("check units (mm), axes (RAS)"));
+  run.updates = 0;
+  EXPECT_THAT(headline(run), HasSubstr("no update came"));
+}
+
+TEST(Html, APageOfARealSurgeryHasNoDashAndNoPublishedFigures) {
+  const ReportedRun run{real_run(), std::nullopt};
+  const std::string page = html_page({run}, group_runs({run}), {});
+  EXPECT_THAT(page, Not(HasSubstr(kNothing)));
+  EXPECT_THAT(page, Not(HasSubstr("<td></td>")));
+  EXPECT_THAT(page, Not(HasSubstr("class=\"paper\"")));
+  EXPECT_THAT(page, HasSubstr("<h2>Left out and predicted</h2>"));
+}
+
+TEST(Html, PicturesThatDoNotFitAreNamed) {
+  const ReportedRun run{small_run("contact"), std::nullopt};
+  PagePicture beside;
+  beside.file_name = "sd-paper.png";
+  const std::string page = html_page({run}, group_runs({run}), {beside});
+  EXPECT_THAT(page, HasSubstr("Beside this page, which is full, lie: sd-paper.png."));
+}
+
+TEST(Duration, HasTheUnitThatPeopleUse) {
+  EXPECT_EQ(duration(4.25), "4.2 ms");
+  EXPECT_EQ(duration(87.4), "87 ms");
+  EXPECT_EQ(duration(999.6), "1.0 s");
+  EXPECT_EQ(duration(260545.0), "4.3 min");
+  EXPECT_EQ(duration(59990.0), "1.0 min");
+  EXPECT_EQ(duration(7.2e6), "2.0 h");
 }
 
 TEST(SummaryTable, HasALinePerRunAndThePapers) {

@@ -1,0 +1,191 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "client/tools/advise/advise.hpp"
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include <memory>
+#include <nlohmann/json.hpp>
+#include <set>
+#include <utility>
+
+#include "common/io/files/file_access.hpp"
+#include "common/io/model/model_file.hpp"
+#include "common/io/recording/surgery_file.hpp"
+#include "common/pipeline/pipeline.hpp"
+#include "common/wire/convert.hpp"
+
+namespace brainshift::client {
+namespace {
+
+Result<std::vector<Observation>> observations_of(const AdviseOptions& options,
+                                                 const std::string& model_id) {
+  const auto file = io::SurgeryFile::open(options.surgery);
+  if (!file) return tl::unexpected(file.error());
+  if (file->meta().model_id != model_id) {
+    return io::invalid_file(options.surgery,
+                            fmt::format("meta.model_id is \"{}\", but {} holds \"{}\"",
+                                        file->meta().model_id, options.model.string(), model_id));
+  }
+  const auto records = file->records(io::RecordKind::kObservation);
+  if (!records) return tl::unexpected(records.error());
+  if (records->empty()) {
+    return io::file_error(ErrorCode::kEmptySet, options.surgery, "holds no observation");
+  }
+  if (options.observations > records->size()) {
+    return invalid(fmt::format("--observations is {}, but {} holds {}", options.observations,
+                               options.surgery.string(), records->size()));
+  }
+  const std::size_t count = options.observations > 0 ? options.observations : records->size();
+  std::vector<Observation> observations;
+  for (std::size_t i = 0; i < count; ++i) {
+    auto observation = wire::decode_observation((*records)[i].payload);
+    if (!observation) {
+      return io::unreadable(
+          options.surgery,
+          fmt::format("observation {}: {}", (*records)[i].sequence, observation.error().message));
+    }
+    observations.push_back(std::move(*observation));
+  }
+  return observations;
+}
+
+Result<pipeline::Pipeline> build_pipeline(const AdviseOptions& options, io::ModelFile& file,
+                                          std::shared_ptr<const geometry::TetLocator> locator) {
+  if (file.condensed.empty()) {
+    return io::file_error(ErrorCode::kEmptySet, options.model,
+                          fmt::format("holds no operators for the boundary condition {}",
+                                      to_string(options.boundary)));
+  }
+  auto inverter = inversion::condensed_inverter(
+      std::make_shared<const CondensedOperators>(std::move(file.condensed.front())),
+      std::move(locator), file.config);
+  if (!inverter) return tl::unexpected(inverter.error());
+  return pipeline::Pipeline::build(file.model, file.config, Method::kCondensed, options.boundary,
+                                   std::move(*inverter));
+}
+
+Status play(const std::vector<Observation>& observations, pipeline::Pipeline& pipeline,
+            const Progress& progress, Advised& advised) {
+  std::set<std::string> sources;
+  bool answered = false;
+  for (const Observation& observation : observations) {
+    auto update = pipeline.run(observation);
+    ++advised.played;
+    if (progress) {
+      progress("play",
+               static_cast<double>(advised.played) / static_cast<double>(observations.size()));
+    }
+    answered = update.has_value();
+    if (!update) {
+      advised.failures.push_back(fmt::format("observation {} of {}: {}", observation.sequence,
+                                             observation.source, update.error().message));
+      continue;
+    }
+    sources.insert(observation.source);
+    advised.update = std::move(*update);
+  }
+  advised.sources.assign(sources.begin(), sources.end());
+  if (!answered) {
+    return fail(ErrorCode::kNotConverged,
+                "advise: the last observation gave no estimate: " + advised.failures.back());
+  }
+  const QualityVerdict& verdict = advised.update.estimate.quality;
+  if (verdict.usable()) return {};
+  return fail(ErrorCode::kNotConverged,
+              "advise: the field after the last observation is unusable: " + verdict.reason);
+}
+
+nlohmann::json place_json(const Vec3& place) { return {place[0], place[1], place[2]}; }
+
+}  // namespace
+
+Result<Advised> advise(const AdviseOptions& options, const Progress& progress) {
+  auto file = io::read_model(options.model, {options.boundary});
+  if (!file) return tl::unexpected(file.error());
+  const auto observations = observations_of(options, file->model.model_id);
+  if (!observations) return tl::unexpected(observations.error());
+  auto candidates =
+      options.candidates.empty()
+          ? Result<std::vector<advice::Candidate>>(advice::default_candidates(file->model))
+          : advice::read_candidates(options.candidates, file->model);
+  if (!candidates) return tl::unexpected(candidates.error());
+  const auto locator = std::make_shared<const geometry::TetLocator>(file->model.mesh);
+  auto pipeline = build_pipeline(options, *file, locator);
+  if (!pipeline) return tl::unexpected(pipeline.error());
+
+  Advised advised;
+  if (options.target_mm) {
+    const Vec3& at = *options.target_mm;
+    advised.target = {fmt::format("({:.1f}, {:.1f}, {:.1f}) mm", at[0], at[1], at[2]), at};
+  } else {
+    advised.target = advice::tumour_target(file->model);
+  }
+  if (Status ok = play(*observations, *pipeline, progress, advised); !ok) {
+    return tl::unexpected(ok.error());
+  }
+  auto ranked = advice::rank(*pipeline, file->config, *locator, advised.update.estimate,
+                             *candidates, advised.target);
+  if (!ranked) return tl::unexpected(ranked.error());
+  advised.advice = std::move(*ranked);
+  advised.model = std::move(file->model);
+  return advised;
+}
+
+std::vector<std::string> advise_lines(const Advised& advised) {
+  std::vector<std::string> lines;
+  lines.push_back(fmt::format("{}: sd {:.3f} mm per component, after {} observation{} of {} ({})",
+                              advised.target.name, advised.advice.front().before_mm, advised.played,
+                              advised.played == 1 ? "" : "s", fmt::join(advised.sources, ", "),
+                              to_string(advised.update.estimate.quality.quality)));
+  lines.push_back(fmt::format("{:>4} {:>8} {:>8}  {:<42} {}", "rank", "sd mm", "less mm",
+                              "measurement", "at R, A, S mm"));
+  int rank = 0;
+  for (const advice::Advice& one : advised.advice) {
+    const Vec3 at = one.candidate.centre();
+    if (!one.reason.empty()) {
+      lines.push_back(
+          fmt::format("{:>4} {:>8} {:>8}  {:<42} {}", "-", "", "", one.candidate.name, one.reason));
+      continue;
+    }
+    lines.push_back(fmt::format("{:>4} {:>8.3f} {:>8.3f}  {:<42} {:.0f}, {:.0f}, {:.0f}", ++rank,
+                                one.after_mm, one.reduction_mm(), one.candidate.name, at[0], at[1],
+                                at[2]));
+  }
+  for (const std::string& failure : advised.failures) lines.push_back("left out: " + failure);
+  return lines;
+}
+
+std::string advise_json(const Advised& advised) {
+  nlohmann::json candidates = nlohmann::json::array();
+  for (std::size_t i = 0; i < advised.advice.size(); ++i) {
+    const advice::Advice& one = advised.advice[i];
+    const auto number = [&](double value) {
+      return one.reason.empty() ? nlohmann::json(value) : nlohmann::json();
+    };
+    nlohmann::json entry = {{"rank", i + 1},
+                            {"name", one.candidate.name},
+                            {"kind", std::string(to_string(one.candidate.kind))},
+                            {"sd_before_mm", number(one.before_mm)},
+                            {"sd_after_mm", number(one.after_mm)},
+                            {"reduction_mm", number(one.reduction_mm())},
+                            {"where_mm", place_json(one.candidate.centre())},
+                            {"data", one.data}};
+    if (!one.reason.empty()) entry["reason"] = one.reason;
+    candidates.push_back(std::move(entry));
+  }
+  const nlohmann::json json = {
+      {"case", advised.model.case_id},
+      {"model_id", advised.model.model_id},
+      {"observations", advised.played},
+      {"sources", advised.sources},
+      {"quality", std::string(to_string(advised.update.estimate.quality.quality))},
+      {"target",
+       {{"name", advised.target.name},
+        {"centre_mm", place_json(advised.target.points.rowwise().mean())}}},
+      {"failures", advised.failures},
+      {"candidates", std::move(candidates)}};
+  return json.dump(2) + "\n";
+}
+
+}  // namespace brainshift::client

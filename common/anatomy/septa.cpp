@@ -1,0 +1,237 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "common/anatomy/septa.hpp"
+
+#include <fmt/format.h>
+
+#include <Eigen/Geometry>
+#include <algorithm>
+#include <map>
+#include <utility>
+
+#include "common/geometry/closest_point.hpp"
+#include "common/geometry/mesh_quality.hpp"
+#include "common/geometry/surface.hpp"
+#include "common/values/brain_model.hpp"
+
+namespace brainshift::anatomy {
+namespace {
+
+using Facet = std::array<int, 3>;
+
+std::size_t at(int i) { return static_cast<std::size_t>(i); }
+
+double area_of(const Points& nodes, const Facet& f) {
+  const Vec3 a = nodes.col(f[0]), b = nodes.col(f[1]), c = nodes.col(f[2]);
+  return 0.5 * (b - a).cross(c - a).norm();
+}
+
+// Which tetrahedra are taken out.
+std::vector<char> cavities(const TetMesh& mesh, const std::string& what, Notes* notes) {
+  std::vector<char> outer(at(mesh.num_nodes()), 0);
+  const Eigen::Matrix3Xi surface = geometry::boundary_triangles(mesh);
+  for (const int n : surface.reshaped()) outer[at(n)] = 1;
+  std::vector<int> inside;
+  double touching_mm3 = 0.0, small_mm3 = 0.0, all_mm3 = 0.0;
+  for (int t = 0; t < mesh.num_tets(); ++t) {
+    if (mesh.labels[at(t)] != kVentricleRegion) continue;
+    const auto nodes = mesh.tets.col(t);
+    all_mm3 += geometry::tet_volume(mesh, t);
+    if (std::any_of(nodes.begin(), nodes.end(), [&](int n) { return outer[at(n)] != 0; })) {
+      touching_mm3 += geometry::tet_volume(mesh, t);
+    } else {
+      inside.push_back(t);
+    }
+  }
+  std::vector<char> taken(at(mesh.num_tets()), 0);
+  const geometry::TetComponents parts = geometry::tet_components(mesh.tets(Eigen::all, inside));
+  std::vector<double> volumes(parts.sizes.size(), 0.0);
+  for (std::size_t i = 0; i < inside.size(); ++i) {
+    volumes[at(parts.component_of_tet[i])] += geometry::tet_volume(mesh, inside[i]);
+  }
+  for (std::size_t i = 0; i < inside.size(); ++i) {
+    const bool large = volumes[at(parts.component_of_tet[i])] >= kSmallestVentricle_mm3;
+    taken[at(inside[i])] = large;
+    if (!large) small_mm3 += geometry::tet_volume(mesh, inside[i]);
+  }
+  if (touching_mm3 > 0.05 * all_mm3 || small_mm3 > 0.0) {
+    add_note(notes, fmt::format("{}: of {:.1f} cc of ventricles in the mesh {:.1f} cc touch the "
+                                "brain's surface and {:.1f} cc lie apart in parts below {:g} cc; "
+                                "they are brain",
+                                what, all_mm3 / 1e3, touching_mm3 / 1e3, small_mm3 / 1e3,
+                                kSmallestVentricle_mm3 / 1e3));
+  }
+  return taken;
+}
+
+using Edge = std::pair<int, int>;
+std::array<Edge, 3> edges_of(const Facet& f) {
+  return {{{f[0], f[1]}, {f[0], f[2]}, {f[1], f[2]}}};
+}
+
+// The facets of one septum without teeth and islands. rim: edges of the outer surface, which hold a
+// facet as a neighbour does.
+geometry::Facets without_teeth_and_islands(geometry::Facets facets, const Points& nodes,
+                                           const std::vector<Edge>& rim, const char* name,
+                                           const std::string& what, Notes* notes) {
+  int teeth = 0;
+  for (bool found = true; found;) {
+    std::map<Edge, int> uses;
+    for (const Facet& f : facets)
+      for (const Edge& edge : edges_of(f)) ++uses[edge];
+    const auto hangs = [&](const Facet& f) {
+      int held = 0;
+      for (const Edge& edge : edges_of(f)) {
+        held += uses[edge] > 1 || std::binary_search(rim.begin(), rim.end(), edge) ? 1 : 0;
+      }
+      return held < 2;
+    };
+    const auto removed = std::erase_if(facets, hangs);
+    teeth += static_cast<int>(removed);
+    found = removed > 0;
+  }
+  // Facets that edges join, by the lowest of them.
+  std::vector<std::size_t> part(facets.size());
+  std::map<Edge, std::vector<std::size_t>> at_edge;
+  for (std::size_t i = 0; i < facets.size(); ++i)
+    for (const Edge& edge : edges_of(facets[i])) at_edge[edge].push_back(i);
+  std::map<std::size_t, double> areas;
+  std::vector<char> seen(facets.size(), 0);
+  for (std::size_t start = 0; start < facets.size(); ++start) {
+    if (seen[start]) continue;
+    std::vector<std::size_t> front = {start};
+    seen[start] = 1;
+    while (!front.empty()) {
+      const std::size_t i = front.back();
+      front.pop_back();
+      part[i] = start;
+      areas[start] += area_of(nodes, facets[i]);
+      for (const Edge& edge : edges_of(facets[i]))
+        for (const std::size_t next : at_edge[edge]) {
+          if (!seen[next]) front.push_back(next);
+          seen[next] = 1;
+        }
+    }
+  }
+  geometry::Facets kept;
+  for (std::size_t i = 0; i < facets.size(); ++i) {
+    if (areas[part[i]] >= kSmallestSeptum_mm2) kept.push_back(facets[i]);
+  }
+  int islands = 0;
+  double islands_mm2 = 0.0, left_mm2 = 0.0;
+  for (const auto& [first, area] : areas) {
+    if (area >= kSmallestSeptum_mm2) {
+      left_mm2 += area;
+    } else {
+      ++islands, islands_mm2 += area;
+    }
+  }
+  if (teeth > 0 || islands > 0) {
+    add_note(notes,
+             fmt::format("{}: {} of {:.1f} cm2; {} facets that hang on one edge and {} islands of "
+                         "together {:.1f} cm2 are left out",
+                         what, name, left_mm2 / 100.0, teeth, islands, islands_mm2 / 100.0));
+  }
+  return kept;
+}
+
+// Interface facets of each septum.
+std::array<geometry::Facets, 2> parted_facets(const TetMesh& mesh, const Regions& regions,
+                                              const std::vector<char>& taken,
+                                              const TriangleSurface& tumour,
+                                              const std::string& what, Notes* notes) {
+  auto inside_tumour = geometry::ClosestPointIndex::build(tumour);
+  if (!geometry::is_closed(tumour)) inside_tumour = fail(ErrorCode::kInvalidArgument, "");
+  std::array<geometry::Facets, 2> facets;
+  int through_tumour = 0;
+  std::map<std::pair<Septum, int>, bool> known;
+  const std::vector<geometry::MeshFace> faces = geometry::sorted_faces(mesh.tets);
+  for (std::size_t f = 0; f + 1 < faces.size(); ++f) {
+    if (faces[f].nodes != faces[f + 1].nodes) continue;
+    if (taken[at(faces[f].tet)] || taken[at(faces[f + 1].tet)]) continue;
+    const Septum septum =
+        septum_between(mesh.labels[at(faces[f].tet)], mesh.labels[at(faces[f + 1].tet)]);
+    if (septum == Septum::kNone) continue;
+    Vec3 centre = Vec3::Zero();
+    bool parted = true;
+    for (const int n : faces[f].nodes) {
+      centre += mesh.nodes.col(n) / 3.0;
+      const auto [entry, added] = known.try_emplace({septum, n}, false);
+      if (added) entry->second = regions.parted(septum, mesh.nodes.col(n));
+      parted = parted && entry->second;
+    }
+    if (!parted || !regions.parted(septum, centre)) continue;
+    if (inside_tumour && inside_tumour->contains(centre)) {
+      ++through_tumour;
+      continue;
+    }
+    facets[septum == Septum::kFalx ? 0 : 1].push_back(faces[f].nodes);
+  }
+  if (through_tumour > 0) {
+    add_note(notes, fmt::format("{}: {} facets of falx and tentorium lie inside the tumour, which "
+                                "joins their sides; they are left out",
+                                what, through_tumour));
+  }
+  return facets;
+}
+
+// Labels of values/brain_model.hpp.
+void name_tissues(TetMesh& mesh, const Regions& regions, bool tissues) {
+  if (!tissues) return mesh.labels.clear();
+  for (int& label : mesh.labels) {
+    switch (label) {
+      case kLeftGrey:
+      case kRightGrey: label = regions.tells_matter() ? kGreyMatter : 0; break;
+      case kLeftWhite:
+      case kRightWhite: label = kWhiteMatter; break;
+      case kCerebellumRegion: label = kCerebellumLabel; break;
+      case kBrainstemRegion: label = kBrainstemLabel; break;
+      default: label = 0;
+    }
+  }
+}
+
+}  // namespace
+
+Result<geometry::SlitMesh> with_septa_and_ventricles(const TetMesh& mesh, const Regions& regions,
+                                                     const AnatomyConfig& wanted,
+                                                     const TriangleSurface& tumour,
+                                                     const std::string& what, Notes* notes) {
+  std::vector<char> taken(at(mesh.num_tets()), 0);
+  if (wanted.ventricles) taken = cavities(mesh, what, notes);
+  geometry::Facets facets;
+  std::vector<int> septum_of;
+  if (wanted.septa) {
+    std::vector<Edge> rim;
+    const Eigen::Matrix3Xi outer = geometry::boundary_triangles(mesh);
+    for (const auto& triangle : outer.colwise()) {
+      Facet f{triangle[0], triangle[1], triangle[2]};
+      std::sort(f.begin(), f.end());
+      for (const Edge& edge : edges_of(f)) rim.push_back(edge);
+    }
+    std::sort(rim.begin(), rim.end());
+    const std::array<geometry::Facets, 2> found =
+        parted_facets(mesh, regions, taken, tumour, what, notes);
+    for (std::size_t s = 0; s < 2; ++s) {
+      const geometry::Facets kept = without_teeth_and_islands(
+          found[s], mesh.nodes, rim, s == 0 ? "falx" : "tentorium", what, notes);
+      facets.insert(facets.end(), kept.begin(), kept.end());
+      septum_of.resize(facets.size(), static_cast<int>(s));
+    }
+    if (facets.empty()) {
+      return fail(
+          ErrorCode::kEmptySet,
+          fmt::format("{}: no falx or tentorium: nowhere does cortex of the left hemisphere "
+                      "lie beside cortex of the right one without tissue between them "
+                      "(anatomy.septa: off leaves them out)",
+                      what));
+    }
+  }
+  geometry::SlitMesh cut = geometry::cut_mesh(mesh, taken, facets, septum_of);
+  name_tissues(cut.mesh, regions, wanted.tissues);
+  if (Status status = geometry::check_mesh(cut.mesh); !status) {
+    return fail(status.error().code, fmt::format("{}: {}", what, status.error().message));
+  }
+  return cut;
+}
+
+}  // namespace brainshift::anatomy
