@@ -17,8 +17,8 @@ namespace brainshift::anatomy {
 enum class Structure { kOther, kCerebrum, kCerebellum, kBrainstem, kVentricle, kFluid };
 Structure structure_of(int label);
 
-// Of a label of the cerebrum. Nuclei are grey matter that is no cortex. kNone: the callosum, lesions
-// and other labels that both hemispheres share.
+// Of a label of the cerebrum. Nuclei are grey matter that is no cortex. kNone: the callosum,
+// lesions and other labels that both hemispheres share.
 enum class Side { kNone, kLeft, kRight };
 enum class Matter { kCortex, kNucleus, kWhite };
 Side side_of(int label);

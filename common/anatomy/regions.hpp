@@ -1,11 +1,12 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // The regions of a head that its label map tells apart, as a field for the mesher; and the places
-// where left and right, or cerebrum and cerebellum, lie side by side without tissue that joins them.
+// where left and right, or cerebrum and cerebellum, lie side by side without tissue that joins
+// them.
 //
 // Each region's voxels are smoothed by a Gaussian, and a point belongs to the region with the
-// largest value there: interfaces are smooth, and what is thinner than the Gaussian vanishes. Voxels
-// without a label of the brain (sulci, vessels, white matter that an atlas leaves out) belong to the
-// nearest region but ventricles.
+// largest value there: interfaces are smooth, and what is thinner than the Gaussian vanishes.
+// Voxels without a label of the brain (sulci, vessels, white matter that an atlas leaves out)
+// belong to the nearest region but ventricles.
 #pragma once
 
 #include <array>

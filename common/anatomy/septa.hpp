@@ -25,8 +25,8 @@ inline constexpr double kSmallestSeptum_mm2 = 400.0;     // of a part of a septu
 inline constexpr double kSmallestVentricle_mm3 = 500.0;  // of a part of the ventricles
 
 // The mesh of mesh_regions with slits and cavities as the case asks; labels become those of
-// values/brain_model.hpp. tumour: closed, or it does not count. kEmptySet: none of what anatomy.septa
-// asks for is there: no facet. kDegenerateMesh: as check_mesh.
+// values/brain_model.hpp. tumour: closed, or it does not count. kEmptySet: none of what
+// anatomy.septa asks for is there: no facet. kDegenerateMesh: as check_mesh.
 Result<geometry::SlitMesh> with_septa_and_ventricles(const TetMesh& mesh, const Regions& regions,
                                                      const AnatomyConfig& wanted,
                                                      const TriangleSurface& tumour,

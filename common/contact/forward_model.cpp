@@ -32,7 +32,8 @@ Points boundary_normals(const BrainModel& model) {
   return geometry::vertex_normals({model.mesh.nodes, model.boundary_triangles});
 }
 
-// As slaves of the skull are; those that are slaves of it too, or of another sheet, keep that normal.
+// As slaves of the skull are; those that are slaves of it too, or of another sheet, keep that
+// normal.
 void fix_along_septa(const BrainModel& model, fem::DofMap& dofs) {
   std::set<NodeIndex> held(model.slaves.begin(), model.slaves.end());
   for (std::size_t i = 0; i < model.septa.slaves.size(); ++i) {

@@ -40,11 +40,11 @@ namespace brainshift::contact {
 //   material.regions   tetrahedra of a label of the mesh (ventricles, white matter, tentorium)
 //   material.tissues   tetrahedra whose tissue the label map told (values/brain_model.hpp)
 //   the rest           material itself
-// The tumour has precedence over the regions, and they over the tissues. Density, permeability and storage are the same
-// everywhere.
+// The tumour has precedence over the regions, and they over the tissues. Density, permeability and
+// storage are the same everywhere.
 
-// The pairs of the model's slaves: with the skull (search_contact), then with the sheets of falx and
-// tentorium, whose gaps and normals the model holds.
+// The pairs of the model's slaves: with the skull (search_contact), then with the sheets of falx
+// and tentorium, whose gaps and normals the model holds.
 Result<std::vector<ContactPair>> contact_pairs(const BrainModel& model);
 
 // kInvalidArgument: a label that the mesh does not have; the sentence names the labels it has.

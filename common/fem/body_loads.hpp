@@ -66,8 +66,8 @@ Points swelling_load(const DisplacementSpace& space, const Material& material,
 Points initial_stress_load(const TetMesh& mesh, const std::function<Mat3(const Vec3&)>& stress);
 
 // Pressure p (per triangle, at its centre, mm) on a wall whose triangles look out of the tissue, a
-// third of a triangle's force at each of its nodes; pressing the tissue where p > 0. Unit: that of p
-// times mm^2. 3 x n.
+// third of a triangle's force at each of its nodes; pressing the tissue where p > 0. Unit: that of
+// p times mm^2. 3 x n.
 Points wall_pressure_load(const Points& nodes, const Eigen::Matrix<int, 3, Eigen::Dynamic>& wall,
                           const std::function<double(const Vec3&)>& pressure);
 

@@ -43,8 +43,8 @@ TriangleSurface offset_surface(const TriangleSurface& surface, double distance_m
 // (mm^2).
 double enclosed_volume(const TriangleSurface& surface);
 double area(const TriangleSurface& surface);
-// By how much a cavity's volume (mm^3) grows when its wall moves. wall: closed, out of the tissue, so
-// that the volume it encloses counts negatively. displacement: 3 x v, mm.
+// By how much a cavity's volume (mm^3) grows when its wall moves. wall: closed, out of the tissue,
+// so that the volume it encloses counts negatively. displacement: 3 x v, mm.
 double growth_of_cavity(const TriangleSurface& wall, const Points& displacement);
 // A third of the area of the triangles at each vertex, mm^2; their sum is area().
 VecX vertex_areas(const TriangleSurface& surface);

@@ -33,11 +33,11 @@
 //                          middle and kBumpsOfRing around it, at kRing of its half axes, Gaussians
 //                          with standard deviations of kBumpWidth of them. What pulls or presses
 //                          there, a spatula or dura that gives way, does not do so all over
-//   ventricles             pressure on the wall of the ventricles, pressing the tissue outwards: the
-//                          same all over, and tanh(x / kMidlineWidth_mm) of the distance x from the
-//                          brain's middle to the right: fluid is drained from one of the two
-//   tract                  what instruments do on the straight way from the middle of the opening to
-//                          the tumour's centre, of length l. At the depth t l and the distance r
+//   ventricles             pressure on the wall of the ventricles, pressing the tissue outwards:
+//                          the same all over, and tanh(x / kMidlineWidth_mm) of the distance x from
+//                          the brain's middle to the right: fluid is drained from one of the two
+//   tract                  what instruments do on the straight way from the middle of the opening
+//                          to the tumour's centre, of length l. At the depth t l and the distance r
 //                          from the way
 //                            w_k = max(0, 1 - |2 t - k|) exp(-r^2 / 2 s^2),  k = 0, 1, 2,
 //                          s = kTractWidth_mm. An initial stress p w_k in each of the three

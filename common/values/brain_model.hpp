@@ -19,8 +19,8 @@
 
 namespace brainshift {
 
-// Labels of tetrahedra whose tissue the label map told (mesh.labels); no mesh file has such numbers.
-// 0: brain, not told apart.
+// Labels of tetrahedra whose tissue the label map told (mesh.labels); no mesh file has such
+// numbers. 0: brain, not told apart.
 inline constexpr int kWhiteMatter = -2, kGreyMatter = -3, kCerebellumLabel = -8,
                      kBrainstemLabel = -16;
 

@@ -15,20 +15,10 @@ std::string_view to_string(Method method) {
 }
 
 std::string_view to_string(PriorPart part) {
-  static constexpr std::string_view kNames[] = {"along_gravity",
-                                                "across_gravity",
-                                                "gravity_sides",
-                                                "gravity_ends",
-                                                "tumour_volume",
-                                                "brain_volume",
-                                                "resection",
-                                                "opening",
-                                                "ventricles",
-                                                "tract",
-                                                "fine",
-                                                "medium",
-                                                "coarse",
-                                                "far"};
+  static constexpr std::string_view kNames[] = {
+      "along_gravity", "across_gravity", "gravity_sides", "gravity_ends", "tumour_volume",
+      "brain_volume",  "resection",      "opening",       "ventricles",   "tract",
+      "fine",          "medium",         "coarse",        "far"};
   return enum_name<PriorPart::kFar>(part, kNames);
 }
 

@@ -63,8 +63,8 @@ void set_gaps(std::uint64_t seed, const Points& nodes, std::vector<contact::Cont
   }
 }
 
-// Sheets of falx and tentorium: nodes of one side, by the mean normal of its facets there. At a free
-// edge those of both sides cancel.
+// Sheets of falx and tentorium: nodes of one side, by the mean normal of its facets there. At a
+// free edge those of both sides cancel.
 void add_septa(const BrainModel& model, const fem::DisplacementSpace& space,
                const std::vector<Hold>& hold, std::vector<contact::ContactPair>& pairs) {
   std::map<NodeIndex, std::pair<Vec3, double>> into;  // areas as vectors and as numbers

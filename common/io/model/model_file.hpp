@@ -18,8 +18,8 @@
 //                       model_inputs.hpp
 //   /mesh/{nodes,tets,labels}, /boundary_triangles, /skull/{vertices,triangles},
 //   /tumour/{vertices,triangles}, /sets/{craniotomy,brainstem,slaves,fixed}
-//   /anatomy/{septum_slaves,septum_normals,septum_triangles,ventricle_wall}, attribute septum_gap_mm;
-//                       where the model has septa or ventricles
+//   /anatomy/{septum_slaves,septum_normals,septum_triangles,ventricle_wall}, attribute
+//                       septum_gap_mm; where the model has septa or ventricles
 //   /tumour_distance  attributes origin_mm (3), spacing_mm, dims (3); the model may have none
 //     values_mm               dims 1*2*3  float32  signed distance, values/distance_grid.hpp
 //   /condensed/contact, /condensed/fixed  either, both or none; attributes model_id, prepare_s

@@ -85,7 +85,8 @@ TEST(CaseKeys, EveryMemberHasAKey) {
   EXPECT_EQ(keys_of<Craniotomy>(), members<Craniotomy>());
   EXPECT_EQ(keys_of<Brainstem>(), members<Brainstem>());
   EXPECT_EQ(keys_of<TissueStiffness>(), members<TissueStiffness>());
-  EXPECT_EQ(keys_of<Material>(), members<Material>());
+  EXPECT_EQ(keys_of<Material>(), members<Material>() - 1 + members<TissueRatios>());
+  EXPECT_EQ(keys_of<AnatomyConfig>(), members<AnatomyConfig>());
   EXPECT_EQ(keys_of<ContactConfig>(), members<ContactConfig>());
   EXPECT_EQ(keys_of<PriorConfig>(), members<PriorConfig>());
   EXPECT_EQ(keys_of<InversionConfig>(), members<InversionConfig>());

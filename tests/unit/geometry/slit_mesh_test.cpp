@@ -15,7 +15,7 @@ namespace brainshift::geometry {
 namespace {
 
 // A box of 40 mm in cells of 10 mm.
-TetMesh box() { return test_support::box_mesh(4, 4, 4, Vec3::Constant(40.0)); }
+TetMesh box_of_cells() { return test_support::box_mesh(4, 4, 4, Vec3::Constant(40.0)); }
 
 std::vector<char> none_of(const TetMesh& mesh) {
   return std::vector<char>(static_cast<std::size_t>(mesh.num_tets()), 0);
@@ -38,13 +38,13 @@ Facets facets_in_plane(const TetMesh& mesh, int axis, const Holds& holds) {
 }
 
 SlitMesh upper_slit() {
-  const TetMesh mesh = box();
+  const TetMesh mesh = box_of_cells();
   const Facets facets = facets_in_plane(mesh, 0, [](const Vec3& x) { return x[2] > 20.0; });
   return cut_mesh(mesh, none_of(mesh), facets, std::vector<int>(facets.size(), 0));
 }
 
 TEST(SlitMesh, DoublesTheNodesOfTheSlitButThoseOfItsFreeEdge) {
-  const TetMesh mesh = box();
+  const TetMesh mesh = box_of_cells();
   const SlitMesh cut = upper_slit();
   ASSERT_EQ(cut.copies.size(), static_cast<std::size_t>(mesh.num_nodes()));
   int doubled = 0;
@@ -86,7 +86,7 @@ TEST(SlitMesh, EachSideHasItsOwnNodesAndNormalsIntoIt) {
 }
 
 TEST(SlitMesh, TheOuterSurfaceKeepsItsTriangles) {
-  const TetMesh mesh = box();
+  const TetMesh mesh = box_of_cells();
   const SlitMesh cut = upper_slit();
   const auto before = boundary_triangles(mesh);
   ASSERT_EQ(cut.outer.cols(), before.cols());
@@ -98,7 +98,7 @@ TEST(SlitMesh, TheOuterSurfaceKeepsItsTriangles) {
 
 // Two slits that meet in a line: three bodies meet there, and each has its own nodes.
 TEST(SlitMesh, SlitsThatMeetPartThreeSides) {
-  const TetMesh mesh = box();
+  const TetMesh mesh = box_of_cells();
   Facets facets = facets_in_plane(mesh, 2, [](const Vec3&) { return true; });
   std::vector<int> group(facets.size(), 1);
   const Facets falx = facets_in_plane(mesh, 0, [](const Vec3& x) { return x[2] > 20.0; });
@@ -117,7 +117,7 @@ TEST(SlitMesh, SlitsThatMeetPartThreeSides) {
 }
 
 TEST(SlitMesh, WhatIsTakenOutLeavesAWallThatLooksIntoTheCavity) {
-  TetMesh mesh = box();
+  TetMesh mesh = box_of_cells();
   std::vector<char> taken = none_of(mesh);
   double volume = 0.0;
   for (int t = 0; t < mesh.num_tets(); ++t) {

@@ -14,7 +14,7 @@ def row(nodes, processes, work_s, peak_bytes, load=1.0):
     return ",".join(str(values.get(column, 1)) for column in ROWS) + "\n"
 
 
-def write(records, time_ratio, memory_ratio, load=1.0, update_mm=1e-8):
+def write(records, time_ratio, memory_ratio, load=1.0, update_mm=1e-10):
     text = "".join(row(n, 1, 1e-6 * n ** 1.8, 1e3 * n ** 1.4, load)
                    + row(n, 2, time_ratio * 1e-6 * n ** 1.8, memory_ratio * 1e3 * n ** 1.4, load) for n in NODES)
     records.write("rows.csv", ",".join(ROWS) + "\n" + text)
@@ -45,8 +45,8 @@ def test_what_is_shared_and_what_is_split_are_told_apart():
     assert found.at(1e6, 8) == pytest.approx(2e6 + 1e-3 * 1e6 ** 1.8 / 8)
 
 
-@pytest.mark.parametrize("time, memory, update_mm, status", [(0.6, 0.55, 1e-8, 0), (0.7, 0.55, 1e-8, 1), (0.6, 0.7, 1e-8, 1),
-                                                             (0.6, 0.55, 1e-4, 1)])
+@pytest.mark.parametrize("time, memory, update_mm, status", [(0.6, 0.55, 1e-10, 0), (0.7, 0.55, 1e-10, 1), (0.6, 0.7, 1e-10, 1),
+                                                             (0.6, 0.55, 1e-7, 1)])
 def test_every_bound_is_held(records, time, memory, update_mm, status):
     write(records, time, memory, update_mm=update_mm)
     assert records.run("scaling")[0] == status

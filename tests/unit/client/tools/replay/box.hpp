@@ -2,6 +2,7 @@
 // A cube of tetrahedra as test model: 10 mm wide, 4 x 4 x 4 cells.
 #pragma once
 
+#include "common/geometry/surface.hpp"
 #include "common/values/brain_model.hpp"
 #include "tests/support/box_mesh.hpp"
 
@@ -15,6 +16,7 @@ inline BrainModel box_model() {
   model.case_id = "box";
   model.model_id = "0123456789abcdef";
   model.mesh = box_mesh();
+  model.boundary_triangles = geometry::boundary_triangles(model.mesh);
   model.craniotomy = test_support::nodes_where(model.mesh, [](const Vec3& x) {
     return x.z() > 9.9 && x.head<2>().minCoeff() > 0.1 && x.head<2>().maxCoeff() < 9.9;
   });
