@@ -9,6 +9,7 @@
 
 #include "common/core/random.hpp"
 #include "common/core/statistics.hpp"
+#include "common/geometry/node_choice.hpp"
 #include "common/registration/alignment_data.hpp"
 
 namespace brainshift::pipeline {
@@ -196,6 +197,36 @@ Result<RegisteredObservation> from_surface(const CorticalSurface& body,
   return registered;
 }
 
+// Pairs in groups about kMostLandmarks of them that are spread over all, each the mean of its
+// group: what a displacement that is affine over a group says of it, with as much weight.
+struct GroupedPairs {
+  Points undeformed, displacements;
+  VecX count;  // of each group
+};
+GroupedPairs grouped(const Points& undeformed, const Points& displacements) {
+  const auto centres = geometry::spread_nodes(undeformed, kMostLandmarks);
+  const auto groups = static_cast<Eigen::Index>(centres.size());
+  const Points places = undeformed(Eigen::all, centres);
+  GroupedPairs result{Points::Zero(3, groups), Points::Zero(3, groups), VecX::Zero(groups)};
+  for (Eigen::Index i = 0; i < undeformed.cols(); ++i) {
+    Eigen::Index nearest = 0;
+    (places.colwise() - undeformed.col(i)).colwise().squaredNorm().minCoeff(&nearest);
+    result.undeformed.col(nearest) += undeformed.col(i);
+    result.displacements.col(nearest) += displacements.col(i);
+    result.count[nearest] += 1.0;
+  }
+  // Places that several share leave a group without any.
+  Eigen::Index kept = 0;
+  for (Eigen::Index g = 0; g < groups; ++g) {
+    if (result.count[g] == 0.0) continue;
+    result.undeformed.col(kept) = result.undeformed.col(g) / result.count[g];
+    result.displacements.col(kept) = result.displacements.col(g) / result.count[g];
+    result.count[kept++] = result.count[g];
+  }
+  return {result.undeformed.leftCols(kept), result.displacements.leftCols(kept),
+          result.count.head(kept)};
+}
+
 Result<RegisteredObservation> from_landmarks(const LandmarkPairs& pairs, const CaseConfig& config,
                                              Method method) {
   if (pairs.undeformed.cols() != pairs.deformed.cols()) {
@@ -211,8 +242,15 @@ Result<RegisteredObservation> from_landmarks(const LandmarkPairs& pairs, const C
   registered.data.displacements = pairs.deformed - pairs.undeformed;
   registered.data.sd_mm =
       VecX::Constant(pairs.undeformed.cols(), datum_sd_mm(pairs.sd_mm, config.inversion, method));
-  registered.data.common_error = registration::pose_errors(
-      pairs.undeformed, config.sensing.landmark_pose_sd_mm, config.sensing.landmark_pose_sd_deg);
+  if (method == Method::kCondensed && pairs.undeformed.cols() > kMostLandmarks) {
+    const GroupedPairs groups = grouped(pairs.undeformed, registered.data.displacements);
+    registered.data.positions = groups.undeformed;
+    registered.data.displacements = groups.displacements;
+    registered.data.sd_mm = registered.data.sd_mm[0] * groups.count.cwiseSqrt().cwiseInverse();
+  }
+  registered.data.common_error =
+      registration::pose_errors(registered.data.positions, config.sensing.landmark_pose_sd_mm,
+                                config.sensing.landmark_pose_sd_deg);
   return registered;
 }
 

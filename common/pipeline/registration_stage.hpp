@@ -10,8 +10,10 @@
 //                               estimate (registration/surface_distances.hpp; method condensed).
 //                               The pose is where they start; it tells gross outliers too
 //                    rigid      displacements by the pose, with its errors (other methods)
-//   LandmarkPairs    displacement = deformed - undeformed, all pairs. sensing.landmark_pose_sd_mm
-//                    and _deg are a common error: misregistration of the image during surgery
+//   LandmarkPairs    displacement = deformed - undeformed, all pairs; of more than kMostLandmarks
+//                    (method condensed) the means of so many groups of neighbours, with the
+//                    standard deviation of a mean. sensing.landmark_pose_sd_mm and _deg are a
+//                    common error: misregistration of the image during surgery
 //   CorticalSurface  sensing.surface_points of its vertices over the craniotomy, chosen likewise,
 //                    and by sensing.surface:
 //                    distances  along the normal of the model's cortex, made anew for every
@@ -46,6 +48,9 @@
 #include "common/values/sparse_data.hpp"
 
 namespace brainshift::pipeline {
+
+// As many as guide an estimate for a surface (registration/surface_distances.hpp).
+inline constexpr int kMostLandmarks = 300;
 
 struct RegisteredObservation {
   std::string source;

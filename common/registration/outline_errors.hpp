@@ -32,7 +32,8 @@ struct OutlineErrors {
   Eigen::MatrixXd variances;
 };
 
-// places: 3 x m on the outline, mm. No columns where no length counts. Some milliseconds for 200 of them.
+// places: 3 x m on the outline, mm. No columns where no length counts. Some milliseconds for 200 of
+// them.
 OutlineErrors outline_errors(const Points& places);
 
 }  // namespace brainshift::registration

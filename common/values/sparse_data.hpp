@@ -7,9 +7,9 @@
 //
 // Assumptions: errors are zero-mean and Gaussian. e is isotropic and independent from datum to
 // datum. An error that several data share, for example a misalignment, is in common_error.
-// How large some of them are, and over which length they vary, may not be known: c ~ N(0, diag(v_e))
-// under hypothesis e of kOutlineErrors. Methods that know independent errors only, such as the
-// paper's, ignore common_error.
+// How large some of them are, and over which length they vary, may not be known: c ~ N(0,
+// diag(v_e)) under hypothesis e of kOutlineErrors. Methods that know independent errors only, such
+// as the paper's, ignore common_error.
 #pragma once
 
 #include <array>

@@ -7,9 +7,10 @@
 //   J(z) = min over c of 1/2 |R^-1/2 (d - A u(z) - common c)|^2 + 1/2 |V^-1/2 c|^2 + 1/2 |x|^2
 //
 // with z = S x, S the strengths of the prior's parts and V the common errors' variances. J is
-// continuous and piecewise quadratic, one piece for each active set. The linear model of one set gives the second derivative H and the Newton step to
-// its piece's minimum. The gradient of any other piece is cheap: by the adjoint, one solve with the
-// compliance of its slaves. J is searched in two ways:
+// continuous and piecewise quadratic, one piece for each active set. The linear model of one set
+// gives the second derivative H and the Newton step to its piece's minimum. The gradient of any
+// other piece is cheap: by the adjoint, one solve with the compliance of its slaves. J is searched
+// in two ways:
 //
 //   rough  From afar J looks smooth, with more or less curvature than its pieces have. Gradients
 //          correct H as the search goes on (newton_steps.hpp), also those of trials that J did not

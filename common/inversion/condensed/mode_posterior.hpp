@@ -102,9 +102,9 @@ class ModePosterior {
 
   // d - A u - common error, whitened, rows.
   auto residual() const { return residual_.head(rows_); }
-  // ratio: sqrt(|residual|^2 / n), n = rows - k; k = tr(G Cov(c, z)) of the last minimise() counts the
-  // unknowns that the data decide. Where the model holds |residual|^2 has the mean n, so that 1 says
-  // that the data lie as far off as their standard deviations say. by_chance: the ratio of a
+  // ratio: sqrt(|residual|^2 / n), n = rows - k; k = tr(G Cov(c, z)) of the last minimise() counts
+  // the unknowns that the data decide. Where the model holds |residual|^2 has the mean n, so that 1
+  // says that the data lie as far off as their standard deviations say. by_chance: the ratio of a
   // chi-square of n degrees of freedom two standard deviations above its mean.
   struct Misfit {
     double ratio = 0.0, by_chance = 1.0;

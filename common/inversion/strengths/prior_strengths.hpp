@@ -8,7 +8,8 @@
 //   p(s_g = 0) = kAbsent        p(s_g) ~ exp(-ln^2 s_g / (2 kLogStrengthSd^2)) for the others
 //
 // How large the errors are that neighbours on an outline share, and over which length, is not known
-// either: e is one of kOutlineErrors, with p(e) of kNoOutlineError for none and alike for the others.
+// either: e is one of kOutlineErrors, with p(e) of kNoOutlineError for none and alike for the
+// others.
 //
 // A *hypothesis* is one strength for every part, and e. Its marginal likelihood p(d | s, e) is that
 // of the linear model of one contact set (strength_evidence.hpp).
@@ -21,9 +22,10 @@
 // enters: two families may explain the same data. Or they differ in e, and in one part or none: a
 // swelling that is not there explains an outline that is off. fit() finds a hypothesis that is more
 // probable than its neighbours by coordinate ascent, best part first, from s = 0 and from s = 1,
-// without errors of the outline and with the largest, and takes in the neighbours that have weight. Their weights are p(d | s) p(s), normalised (spike and slab:
-// Mitchell & Beauchamp 1988, JASA 83:1023; averaging: Hoeting et al. 1999, Stat. Sci. 14:382).
-// Estimate and covariance are those of the mixture:
+// without errors of the outline and with the largest, and takes in the neighbours that have weight.
+// Their weights are p(d | s) p(s), normalised (spike and slab: Mitchell & Beauchamp 1988, JASA
+// 83:1023; averaging: Hoeting et al. 1999, Stat. Sci. 14:382). Estimate and covariance are those of
+// the mixture:
 //
 //   z = sum w_h m_h        Cov = sum w_h (C_h + (m_h - z)(m_h - z)^T)
 //

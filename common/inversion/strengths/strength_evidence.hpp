@@ -8,8 +8,8 @@
 //   ln p(d | v) = -1/2 ln |I + S G S| + 1/2 b^T S (I + S G S)^-1 S b + const,   S^2 = diag(V_e, v)
 //
 // Cheap because the data say little: a pivoted Cholesky factor G ~ L L^T with few columns (some
-// tens), L y = b, makes y ~ N(0, Omega), Omega = I + L_c^T V_e L_c + sum v_g L_g^T L_g, all that the
-// data say about v; and of each part W_g W_g^T = L_g^T L_g with few columns suffices.
+// tens), L y = b, makes y ~ N(0, Omega), Omega = I + L_c^T V_e L_c + sum v_g L_g^T L_g, all that
+// the data say about v; and of each part W_g W_g^T = L_g^T L_g with few columns suffices.
 //
 // A *profile* is ln p for every value of kStrengths of one part while the others stay. With K K^T =
 // Omega, M = W_g^T Omega^-1 W_g, b = W_g^T Omega^-1 y and N = I - v_g M,

@@ -9,6 +9,8 @@
 #include <set>
 #include <utility>
 
+#include "common/core/random.hpp"
+#include "common/pipeline/registration_stage.hpp"
 #include "common/pipeline/scene.hpp"
 #include "tests/support/results.hpp"
 #include "tests/unit/server/fake_inverter.hpp"
@@ -135,6 +137,30 @@ TEST_F(PipelineTest, LandmarksBecomeTheirDisplacementsWithTheCasesSigma) {
   EXPECT_EQ(update.observation_sequence, 3u);
   EXPECT_EQ(update.case_id, kCase);
   EXPECT_TRUE(update.final);
+}
+
+TEST_F(PipelineTest, ManyLandmarksWeighAsMuchInGroups) {
+  method_ = Method::kCondensed;
+  config_.inversion.sigma_mm = 0.25;
+  Random random(4);
+  Mat3 strain;
+  for (double& entry : strain.reshaped()) entry = 0.02 * random.normal();
+  LandmarkPairs pairs{Points(3, 900), Points(3, 900), 0.1};
+  for (double& x : pairs.undeformed.reshaped()) x = 100.0 * random.uniform();
+  pairs.deformed = pairs.undeformed + strain * pairs.undeformed;
+  Observation observation = landmarks(1);
+  observation.body = pairs;
+  ASSERT_TRUE(run(observation).has_value());
+  ASSERT_EQ(seen_->size(), kMostLandmarks);
+  EXPECT_NEAR(seen_->sd_mm.cwiseAbs2().cwiseInverse().sum(), 900 / (0.25 * 0.25), 1e-6);
+  EXPECT_TRUE(seen_->displacements.isApprox(strain * seen_->positions, 1e-12));
+  // Of one place there is one group.
+  pairs.undeformed.colwise() = Vec3(1, 2, 3);
+  pairs.deformed.colwise() = Vec3(2, 2, 3);
+  observation.body = pairs;
+  ASSERT_TRUE(run(observation).has_value());
+  ASSERT_EQ(seen_->size(), 1);
+  EXPECT_TRUE(seen_->displacements.isApprox(Points(Vec3(1, 0, 0))));
 }
 
 TEST_F(PipelineTest, AShiftedTumourBoundaryGivesBackItsShift) {

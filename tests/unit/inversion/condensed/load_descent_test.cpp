@@ -88,7 +88,8 @@ TEST(NewtonBundle, APieceThatTheFunctionFallsBelowIsDropped) {
 TEST(NewtonBundle, APieceAboveTheFunctionAtThePointIsNotKept) {
   NewtonBundle bundle(2);
   bundle.add_here(vec(1.0, 0.0));
-  // 0.1 |d|^2 + d_x at d = (-4, 0): it rises by -2.4, its Newton step with curvature 1 is (-0.2, 0).
+  // 0.1 |d|^2 + d_x at d = (-4, 0): it rises by -2.4, its Newton step with curvature 1 is (-0.2,
+  // 0).
   EXPECT_FALSE(bundle.add_at(vec(-4.0, 0.0), -2.4, vec(-0.2, 0.0)));
   EXPECT_EQ(bundle.count(), 1);
   EXPECT_TRUE(bundle.add_at(vec(-4.0, 0.0), -8.8 + 1e-12, vec(-0.2, 0.0)));

@@ -352,9 +352,10 @@ TEST(PriorStrengths, WhatIsExplainedBroadlyIsWhatTheDataTookAway) {
             1e-4 * covariance.norm());
 }
 
-// Points on a line of 40 mm: a smooth load moves them, and their outline is off by a smooth error of
-// another length. Columns of the error: a full factor of its covariance for 5 mm, with the variances
-// that make the other hypotheses of it (registration/outline_errors.hpp does this for any points).
+// Points on a line of 40 mm: a smooth load moves them, and their outline is off by a smooth error
+// of another length. Columns of the error: a full factor of its covariance for 5 mm, with the
+// variances that make the other hypotheses of it (registration/outline_errors.hpp does this for any
+// points).
 struct Outline {
   static constexpr int kPoints = 120, kErrors = 24;
   Outline() : columns(kPoints, kErrors), variance(kErrors, kOutlineErrors.size()) {
