@@ -21,8 +21,8 @@
 
 namespace brainshift::registration {
 
-// Columns of B at most.
-inline constexpr int kMaxOutlineColumns = 40;
+// Columns of B at most: on a ball the spherical harmonics up to the fourth degree.
+inline constexpr int kMaxOutlineColumns = 25;
 inline constexpr double kLeastRadius = 1.2;
 
 struct OutlineErrors {

@@ -48,7 +48,7 @@ struct SparseData {
   // In the order of the data; each datum belongs to one source. Empty: one source without a name.
   std::vector<DataSource> sources = {};
 
-  // An alignment has 12 common errors, a camera 6 and an outline up to 40: this is enough for the
+  // An alignment has 12 common errors, a camera 6 and an outline up to 25: this is enough for the
   // sources of a room.
   static constexpr int kMaxCommonErrors = 160;
 

@@ -227,13 +227,11 @@ bool PriorStrengths::search(Hypothesis& best) {
     bool done = false;
   };
   const int last = evidence_.errors() - 1;
-  std::array<Ascent, 4> ascents{
-      Ascent{{absent_parts(), 1.0, 0}}, Ascent{{as_in_the_case(), 1.0, 0}},
-      Ascent{{absent_parts(), 1.0, last}}, Ascent{{as_in_the_case(), 1.0, last}}};
-  const std::size_t starts = last > 0 ? 4 : 2;
+  std::array<Ascent, 2> ascents{Ascent{{absent_parts(), 1.0, 0}},
+                                Ascent{{as_in_the_case(), 1.0, last}}};
   auto ascend_from = [&](int member) {
     const auto own = static_cast<std::size_t>(member);
-    for (std::size_t i = own; i < starts; i += works_.size()) {
+    for (std::size_t i = own; i < ascents.size(); i += works_.size()) {
       Ascent& each = ascents[i];
       each.done = ascend(each.hypothesis, projections_[own], works_[own]) &&
                   log_posterior(each.hypothesis, works_[own], each.log_p);
@@ -241,9 +239,9 @@ bool PriorStrengths::search(Hypothesis& best) {
   };
   team_->run(ascend_from);
   const Ascent* found = nullptr;
-  for (std::size_t i = 0; i < starts; ++i) {
-    if (!ascents[i].done) return false;
-    if (found == nullptr || ascents[i].log_p > found->log_p) found = &ascents[i];
+  for (const Ascent& each : ascents) {
+    if (!each.done) return false;
+    if (found == nullptr || each.log_p > found->log_p) found = &each;
   }
   best = found->hypothesis;
   return true;

@@ -21,8 +21,8 @@
 // The *neighbours* of a hypothesis differ from it in one part, or in two of which one vanishes or
 // enters: two families may explain the same data. Or they differ in e, and in one part or none: a
 // swelling that is not there explains an outline that is off. fit() finds a hypothesis that is more
-// probable than its neighbours by coordinate ascent, best part first, from s = 0 and from s = 1,
-// without errors of the outline and with the largest, and takes in the neighbours that have weight.
+// probable than its neighbours by coordinate ascent, best part first, from s = 0 without errors of
+// the outline and from s = 1 with the largest, and takes in the neighbours that have weight.
 // Their weights are p(d | s) p(s), normalised (spike and slab: Mitchell & Beauchamp 1988, JASA
 // 83:1023; averaging: Hoeting et al. 1999, Stat. Sci. 14:382). Estimate and covariance are those of
 // the mixture:

@@ -204,13 +204,16 @@ TEST_P(Condensed, StandardDeviationBoundsTheDirectOneAndEqualsItNearTheData) {
                                        DirectCovariance::kYes);
   const auto& region = operators(GetParam())->region;
   // Widened by what the data lie off more than they should.
-  double squares = 0.0;
+  double squares = 0.0, free = 3.0 * data.size();
   for (int i = 0; i < data.size(); ++i) {
     const Vec3 off =
         data.displacements.col(i) - estimate.displacement.col(region[static_cast<std::size_t>(i)]);
-    squares += off.squaredNorm() / (3.0 * data.size() * data.sd_mm[i] * data.sd_mm[i]);
+    squares += off.squaredNorm() / (data.sd_mm[i] * data.sd_mm[i]);
+    free -= direct.covariance.diagonal().segment<3>(3 * region[static_cast<std::size_t>(i)]).sum() /
+            (data.sd_mm[i] * data.sd_mm[i]);
   }
-  const double widened = std::max(1.0, std::sqrt(squares));
+  const double ratio = std::sqrt(squares / free);
+  const double widened = ratio > std::sqrt(1.0 + 2.0 * std::sqrt(2.0 / free)) ? ratio : 1.0;
   for (int node = 0; node < patient()->mesh.num_nodes(); ++node) {
     const double variance = direct.covariance.diagonal().segment<3>(3 * node).mean();
     const double expected_mm = widened * std::sqrt(std::max(0.0, variance));
