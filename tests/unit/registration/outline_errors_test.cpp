@@ -49,8 +49,7 @@ TEST(OutlineErrors, HaveTheCovarianceOfEveryHypothesis) {
       // Of a large outline the short errors are more than the columns hold.
       const bool many = radius_mm > 10.0 && kOutlineErrors[e].length_mm < 10.0;
       const double left_out = !many ? 0.06 : radius_mm < 13.0 ? 0.13 : 0.25;
-      EXPECT_LE((made - expected).norm(), left_out * expected.norm())
-          << radius_mm << ", " << e;
+      EXPECT_LE((made - expected).norm(), left_out * expected.norm()) << radius_mm << ", " << e;
       // What is left out is variance that the data's own errors stand for: hardly ever negative.
       EXPECT_LE((made - expected).diagonal().maxCoeff(), 0.01 * std::pow(0.5, 2));
     }
