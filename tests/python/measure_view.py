@@ -170,13 +170,13 @@ def measure(options, record):
     record.figure(STUDY, "received to drawn with 16 pages p50 ms", percentiles(drawn[VIEWERS])[0], "")
     record.figure(STUDY, "received to drawn with 16 pages p99 ms", percentiles(drawn[VIEWERS])[1], "")
     check("page weight: scripts and style", one[2] / 1e6, 4, "MB")
-    record.figure(STUDY, "with MRI, model and one field, as they are", one[1] / 1e6, "MB, on one computer")
+    record.figure(STUDY, "with MRI and model and one field", one[1] / 1e6, "MB on one computer")
     check("time to the first slices", one[0] / 1e3, 2, "s")
     check("value at the cursor against the mesh, greatest", float(errors.max()), stated + 0.02, "mm (the grid's stated error and rounding)")
     record.figure(STUDY, "places compared", len(errors), "in the axial slice")
     record.figure(STUDY, "fields that each of sixteen pages fetched at least", min(heard), f"of {options.updates} updates")
     record.figure(STUDY, "nodes", len(model.nodes), "")
-    record.figure(STUDY, "load of the machine over its processors", os.getloadavg()[1] / os.cpu_count(), "5 minutes, at the end")
+    record.figure(STUDY, "load of the machine over its processors", os.getloadavg()[1] / os.cpu_count(), "5 minutes at the end")
 
 
 def main():
