@@ -172,7 +172,7 @@ def measure(options, record):
     check("page weight: scripts and style", one[2] / 1e6, 4, "MB")
     record.figure(STUDY, "with MRI and model and one field", one[1] / 1e6, "MB on one computer")
     check("time to the first slices", one[0] / 1e3, 2, "s")
-    check("value at the cursor against the mesh, greatest", float(errors.max()), stated + 0.02, "mm (the grid's stated error and rounding)")
+    check("greatest difference at the cursor from the mesh", float(errors.max()), stated + 0.02, "mm (the grid's stated error and rounding)")
     record.figure(STUDY, "places compared", len(errors), "in the axial slice")
     record.figure(STUDY, "fields that each of sixteen pages fetched at least", min(heard), f"of {options.updates} updates")
     record.figure(STUDY, "nodes", len(model.nodes), "")
