@@ -66,8 +66,7 @@ async function loadModel() {
     if (answer.headers.get("Of") !== of) throw new Error("another model came meanwhile");
     return new Uint8Array(await answer.arrayBuffer());
   };
-  made.inside = await bytes("inside");
-  made.grey = made.mri ? await bytes("mri") : null;
+  [made.inside, made.grey] = await Promise.all([bytes("inside"), made.mri ? bytes("mri") : null]);
   const last = made.field.dims.map((n, i) => made.field.origin_mm[i] + (n - 1) * made.field.spacing_mm);
   made.low = made.field.origin_mm.map((v) => v + 8 - MARGIN_MM);  // the field's grid has a margin of 10 mm
   made.middle = last.map((v, i) => (v + made.field.origin_mm[i]) / 2);
@@ -81,6 +80,7 @@ async function loadModel() {
     canvas.height = Math.round(PX_PER_MM * (model.high[plane.up] - model.low[plane.up]));
   }
   surface?.aim(model.low, model.high, model.centre_mm);
+  byId("structures-label").hidden = STRUCTURES.every(([name]) => model[name].triangles.length === 0);
 }
 
 async function loadField() {
@@ -92,6 +92,7 @@ async function loadField() {
   const shorts = new Int16Array(bytes, 0, 3 * n);
   for (let i = 0; i < 3 * n; ++i) made.u[i] = shorts[i] / 512;
   made.vertices = moved(made, model.tumour.vertices);
+  for (const [name] of STRUCTURES) made[name] = moved(made, model[name].vertices);
   made.most = greatest(made, n);
   field = made;
 }
@@ -152,7 +153,12 @@ async function load() {
     if (newModel || newField) {
       draw();
       // For whoever measures: which field is on the screen, and since when (ms since 1970).
-      requestAnimationFrame(() => { document.body.dataset.drawn = `${field?.of ?? ""} ${Date.now()}`; });
+      requestAnimationFrame(() => {
+        document.body.dataset.drawn = `${field?.of ?? ""} ${Date.now()}`;
+        if (!slicesAlone) return;
+        slicesAlone = false;
+        setTimeout(draw);
+      });
     } else {
       drawStrips();
     }
@@ -350,7 +356,7 @@ function draw() {
   if (!model) return;
   const of = drawable(), map = chosen("map"), now = chosen("brain") === "now";
   for (const [name, plane] of Object.entries(PLANES)) drawSlice(byId(name), plane, of, map, now);
-  drawSurface(of, map, now);
+  if (!slicesAlone) drawSurface(of, map, now);
   drawLegend(of, map);
   drawStrips();
   point(cross);
@@ -362,6 +368,10 @@ function shade(of, map, x) {
   return Math.max(0, Math.min(255, Math.round(MAPS[map].signed ? 127.5 * (1 + share) : 255 * share)));
 }
 
+// Inside the brain, of models that have them, with their colours in the slices.
+const STRUCTURES = [["septa", "#ffd166"], ["ventricles", "#4cc9f0"]];
+
+let slicesAlone = true;  // at first: WebGL without a graphics card takes its time
 let surfaceShown = "";  // what of what; the cross changes nothing of it
 function drawSurface(of, map, now) {
   const key = `${model.model_id} ${of?.of} ${map} ${now} ${byId("tumour").checked}`;
@@ -405,11 +415,15 @@ function drawSlice(canvas, plane, of, map, now) {
   }
   context.putImageData(image, 0, 0);
   if (of && byId("arrows").checked) drawArrows(context, plane, of, now);
+  for (const [name, colour] of byId("structures").checked ? STRUCTURES : []) {
+    const { triangles, vertices } = model[name];
+    drawSection(context, plane, triangles, of && now ? of[name] : vertices, colour, 1.5);
+  }
   if (byId("tumour").checked) {
     context.setLineDash([4, 3]);
-    drawSection(context, plane, model.tumour.vertices, "#7fe0ff", 1.2);
+    drawSection(context, plane, model.tumour.triangles, model.tumour.vertices, "#7fe0ff", 1.2);
     context.setLineDash([]);
-    if (of) drawSection(context, plane, of.vertices, "#ff5ad1", 2);
+    if (of) drawSection(context, plane, model.tumour.triangles, of.vertices, "#ff5ad1", 2);
   }
   if (byId("cross").checked) {
     const [cx, cy] = toPixel(plane, cross);
@@ -458,8 +472,8 @@ function drawArrows(context, plane, of, now) {
   context.stroke();
 }
 
-function drawSection(context, plane, vertices, colour, width) {
-  const level = cross[plane.normal], triangles = model.tumour.triangles, n = plane.normal;
+function drawSection(context, plane, triangles, vertices, colour, width) {
+  const level = cross[plane.normal], n = plane.normal;
   context.strokeStyle = colour;
   context.lineWidth = width;
   context.beginPath();

@@ -116,14 +116,16 @@ std::string to_json(const std::deque<HistoryPoint>& points) {
 
 std::string to_json(const BrainModel& model, const FieldGrid& field,
                     const std::optional<FieldGrid>& mri) {
-  const Points& vertices = model.tumour.vertices;
-  const Vec3 centre = vertices.cols() > 0 ? Vec3(vertices.rowwise().mean())
-                                          : Vec3(model.mesh.nodes.rowwise().mean());
+  const Points &vertices = model.tumour.vertices, &nodes = model.mesh.nodes;
+  const Vec3 centre =
+      vertices.cols() > 0 ? Vec3(vertices.rowwise().mean()) : Vec3(nodes.rowwise().mean());
   return line_of({{"model_id", model.model_id},
                   {"case_id", model.case_id},
                   {"centre_mm", {centre[0], centre[1], centre[2]}},
                   {"tumour", json_of(model.tumour)},
-                  {"brain", json_of(geometry::boundary_surface(model.mesh))},
+                  {"brain", json_of(geometry::surface_of(nodes, model.boundary_triangles))},
+                  {"septa", json_of(geometry::surface_of(nodes, model.septa.triangles))},
+                  {"ventricles", json_of(geometry::surface_of(nodes, model.ventricle_wall))},
                   {"field", json_of(field)},
                   {"mri", mri ? json_of(*mri) : Json(nullptr)}});
 }
