@@ -36,6 +36,7 @@ class Daemon:
     """brainshiftd on a socket of its own; `with` ends it."""
 
     def __init__(self, folder, model=None, config=""):
+        self.folder = folder
         self.endpoint = f"ipc://{folder}/daemon.sock"
         self.log = open(folder / "daemon.log", "w")
         (folder / "daemon.yaml").write_text(f"endpoint: {self.endpoint}\n{config}")

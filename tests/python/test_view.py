@@ -3,6 +3,7 @@
 
 BRAINSHIFT_SCREENSHOTS=FOLDER keeps what the browser showed.
 """
+import json
 import os
 import pathlib
 import re
@@ -49,7 +50,8 @@ def keep(browser, name):
 def surgery(head, tmp_path_factory):
     """A daemon that has answered three observations of a recording, and the last update with its model."""
     folder = tmp_path_factory.mktemp("view")
-    daemon = Daemon(folder, head / "model.h5", "age: { aged_after_s: 600, expired_after_s: 1200 }\n")
+    (folder / "journal").mkdir()
+    daemon = Daemon(folder, head / "model.h5", "journal_dir: journal\nage: { aged_after_s: 600, expired_after_s: 1200 }\n")
     with brainshift.connect(daemon.endpoint) as client:
         client.start_session(recorded_clock=True)
         client.subscribe(window=16)
@@ -66,7 +68,7 @@ def surgery(head, tmp_path_factory):
 
 @pytest.fixture(scope="module")
 def view(surgery, head):
-    with View(surgery[0].endpoint, "--model", head / "model.h5") as view:
+    with View(surgery[0].endpoint, "--model", head / "model.h5", "--journal", surgery[0].folder / "journal") as view:
         yield view
 
 
@@ -116,6 +118,31 @@ def test_the_switches_change_the_picture_and_its_legend(browser):
         browser.js(f"document.querySelector('{switch}').click()")
 
 
+def test_the_page_says_where_to_measure_next_as_the_command_does(browser, surgery, head):
+    journal = next((surgery[0].folder / "journal").glob("*.surgery"))
+    told = json.loads(subprocess.run([PROGRAMS / "brainshift", "advise", journal, "--model", head / "model.h5", "--json"],
+                                     capture_output=True, text=True, check=True).stdout)
+    best = [one for one in told["candidates"] if one["reduction_mm"] is not None][:5]
+    assert not browser.js("document.getElementById('advice').checked"), "nothing is computed unasked"
+    before = browser.js("document.getElementById('axial').toDataURL()")
+    browser.js("document.getElementById('advice').click()")
+    browser.wait("document.querySelectorAll('#advice-rows tr').length > 0", 60)
+    assert re.match(r"Where to measure next: sd at the tumour boundary \d+\.\d+ mm now(; none of these would take off 0.01 mm)?$",
+                    browser.text("advice-caption"))
+    shown = browser.js("[...document.querySelectorAll('#advice-rows tr')].map(row => [...row.children].map(cell => cell.textContent))")
+    assert shown == [[f"{one['rank']} {one['name']}", f"{one['reduction_mm']:.2f}", f"{one['sd_after_mm']:.2f}"] for one in best]
+    browser.js("document.querySelector('#advice-rows button').click()")
+    was = re.search(r"in the MRI: R (\S+), A (\S+), S (\S+) ·", browser.text("cursor"))
+    assert np.allclose([float(n) for n in was.groups()], best[0]["where_mm"], atol=0.15), "the cross goes to the first"
+    keep(browser, "advice")
+    assert browser.js("document.getElementById('axial').toDataURL()") != before
+    browser.js("document.getElementById('advice').click()")
+    opened = browser.js("performance.timeOrigin")
+    browser.call("Page.reload")
+    browser.wait(f"performance.timeOrigin > {opened} && document.body?.dataset.drawn")
+    browser.wait(LIVE)
+
+
 def test_keys_move_the_linked_slices(browser):
     before = browser.text("cursor"), browser.js("document.getElementById('coronal').toDataURL()")
     browser.js("document.getElementById('axial').focus()")
@@ -159,7 +186,7 @@ def test_everything_to_operate_has_a_name(browser):
         role = node.get("role", {}).get("value")
         if role in ("radio", "checkbox", "image", "img", "graphics-document"):
             assert node["name"]["value"], node
-    assert sum(node.get("role", {}).get("value") in ("radio", "checkbox") for node in nodes) == 10
+    assert sum(node.get("role", {}).get("value") in ("radio", "checkbox") for node in nodes) == 11
 
 
 @pytest.mark.parametrize("width, dark", [(1400, True), (800, False), (800, True)])

@@ -4,9 +4,10 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
-#include <memory>
+#include <algorithm>
 #include <nlohmann/json.hpp>
 #include <set>
+#include <span>
 #include <utility>
 
 #include "common/io/files/file_access.hpp"
@@ -18,39 +19,78 @@
 namespace brainshift::client {
 namespace {
 
-Result<std::vector<Observation>> observations_of(const AdviseOptions& options,
-                                                 const std::string& model_id) {
-  const auto file = io::SurgeryFile::open(options.surgery);
-  if (!file) return tl::unexpected(file.error());
-  if (file->meta().model_id != model_id) {
-    return io::invalid_file(options.surgery,
-                            fmt::format("meta.model_id is \"{}\", but {} holds \"{}\"",
-                                        file->meta().model_id, options.model.string(), model_id));
+Result<io::SurgeryFile> open_of(const std::filesystem::path& surgery, const std::string& model_id) {
+  auto file = io::SurgeryFile::open(surgery);
+  if (file && file->meta().model_id != model_id) {
+    return io::invalid_file(surgery, fmt::format("meta.model_id is \"{}\", the model is \"{}\"",
+                                                 file->meta().model_id, model_id));
   }
+  return file;
+}
+
+Result<Observation> decode(const std::filesystem::path& surgery, const io::SurgeryRecord& record) {
+  auto observation = wire::decode_observation(record.payload);
+  if (observation) return observation;
+  return io::unreadable(
+      surgery, fmt::format("observation {}: {}", record.sequence, observation.error().message));
+}
+
+Result<std::vector<Observation>> first_of(const std::filesystem::path& surgery,
+                                          const std::string& model_id, std::uint64_t count) {
+  const auto file = open_of(surgery, model_id);
+  if (!file) return tl::unexpected(file.error());
   const auto records = file->records(io::RecordKind::kObservation);
   if (!records) return tl::unexpected(records.error());
   if (records->empty()) {
-    return io::file_error(ErrorCode::kEmptySet, options.surgery, "holds no observation");
+    return io::file_error(ErrorCode::kEmptySet, surgery, "holds no observation");
   }
-  if (options.observations > records->size()) {
-    return invalid(fmt::format("--observations is {}, but {} holds {}", options.observations,
-                               options.surgery.string(), records->size()));
+  if (count > records->size()) {
+    return invalid(fmt::format("--observations is {}, but {} holds {}", count, surgery.string(),
+                               records->size()));
   }
-  const std::size_t count = options.observations > 0 ? options.observations : records->size();
+  if (count == 0) count = records->size();
   std::vector<Observation> observations;
-  for (std::size_t i = 0; i < count; ++i) {
-    auto observation = wire::decode_observation((*records)[i].payload);
-    if (!observation) {
-      return io::unreadable(
-          options.surgery,
-          fmt::format("observation {}: {}", (*records)[i].sequence, observation.error().message));
-    }
+  for (const io::SurgeryRecord& record : std::span(*records).first(count)) {
+    auto observation = decode(surgery, record);
+    if (!observation) return tl::unexpected(observation.error());
     observations.push_back(std::move(*observation));
   }
   return observations;
 }
 
-Result<pipeline::Pipeline> build_pipeline(const AdviseOptions& options, io::ModelFile& file,
+// In the order in which they came.
+Result<std::vector<Observation>> used_of(const std::filesystem::path& journal,
+                                         const std::string& model_id, const SessionKey& session,
+                                         std::map<std::string, std::uint64_t> used) {
+  const auto file = open_of(journal, model_id);
+  if (!file) return tl::unexpected(file.error());
+  std::vector<Observation> observations;
+  const Status read = file->newest_first(
+      io::RecordKind::kObservation, [&](const io::SurgeryRecord& record) -> Result<bool> {
+        auto observation = decode(journal, record);
+        if (!observation) return tl::unexpected(observation.error());
+        const SessionKey& of = observation->session;
+        if (of.boot_id != session.boot_id || of.session_id != session.session_id) {
+          return fail(ErrorCode::kUnavailable, journal.string() + " is of another session");
+        }
+        const auto one = used.find(observation->source);
+        if (one != used.end() && one->second == observation->sequence) {
+          used.erase(one);
+          observations.push_back(std::move(*observation));
+        }
+        return !used.empty();
+      });
+  if (!read) return tl::unexpected(read.error());
+  if (!used.empty()) {
+    return fail(ErrorCode::kUnavailable,
+                fmt::format("{} does not hold observation {} of {}", journal.string(),
+                            used.begin()->second, used.begin()->first));
+  }
+  std::reverse(observations.begin(), observations.end());
+  return observations;
+}
+
+Result<pipeline::Pipeline> build_pipeline(const AdviserOptions& options, io::ModelFile& file,
                                           std::shared_ptr<const geometry::TetLocator> locator) {
   if (file.condensed.empty()) {
     return io::file_error(ErrorCode::kEmptySet, options.model,
@@ -66,11 +106,12 @@ Result<pipeline::Pipeline> build_pipeline(const AdviseOptions& options, io::Mode
 }
 
 Status play(const std::vector<Observation>& observations, pipeline::Pipeline& pipeline,
-            const Progress& progress, Advised& advised) {
+            const Progress& progress, std::stop_token stop, Advised& advised) {
+  pipeline.reset();
   std::set<std::string> sources;
   bool answered = false;
   for (const Observation& observation : observations) {
-    auto update = pipeline.run(observation);
+    auto update = pipeline.run(observation, {.on_iterate = {}, .stop = stop});
     ++advised.played;
     if (progress) {
       progress("play",
@@ -100,36 +141,70 @@ nlohmann::json place_json(const Vec3& place) { return {place[0], place[1], place
 
 }  // namespace
 
-Result<Advised> advise(const AdviseOptions& options, const Progress& progress) {
+struct Adviser::Impl {
+  std::shared_ptr<const BrainModel> model;
+  CaseConfig config;
+  std::shared_ptr<const geometry::TetLocator> locator;
+  pipeline::Pipeline pipeline;
+  std::vector<advice::Candidate> candidates;
+  advice::Target target;
+
+  Result<Advised> advise(const Result<std::vector<Observation>>& observations,
+                         const Progress& progress, std::stop_token stop) {
+    if (!observations) return tl::unexpected(observations.error());
+    Advised advised;
+    advised.model = model;
+    advised.target = target;
+    if (Status ok = play(*observations, pipeline, progress, std::move(stop), advised); !ok) {
+      return tl::unexpected(ok.error());
+    }
+    auto ranked =
+        advice::rank(pipeline, config, *locator, advised.update.estimate, candidates, target);
+    if (!ranked) return tl::unexpected(ranked.error());
+    advised.advice = std::move(*ranked);
+    return advised;
+  }
+};
+
+Adviser::Adviser(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}
+Adviser::Adviser(Adviser&&) noexcept = default;
+Adviser& Adviser::operator=(Adviser&&) noexcept = default;
+Adviser::~Adviser() = default;
+
+Result<Adviser> Adviser::open(const AdviserOptions& options) {
   auto file = io::read_model(options.model, {options.boundary});
   if (!file) return tl::unexpected(file.error());
-  const auto observations = observations_of(options, file->model.model_id);
-  if (!observations) return tl::unexpected(observations.error());
   auto candidates =
       options.candidates.empty()
           ? Result<std::vector<advice::Candidate>>(advice::default_candidates(file->model))
           : advice::read_candidates(options.candidates, file->model);
   if (!candidates) return tl::unexpected(candidates.error());
-  const auto locator = std::make_shared<const geometry::TetLocator>(file->model.mesh);
+  auto locator = std::make_shared<const geometry::TetLocator>(file->model.mesh);
   auto pipeline = build_pipeline(options, *file, locator);
   if (!pipeline) return tl::unexpected(pipeline.error());
-
-  Advised advised;
+  advice::Target target;
   if (options.target_mm) {
     const Vec3& at = *options.target_mm;
-    advised.target = {fmt::format("({:.1f}, {:.1f}, {:.1f}) mm", at[0], at[1], at[2]), at};
+    target = {fmt::format("({:.1f}, {:.1f}, {:.1f}) mm", at[0], at[1], at[2]), at};
   } else {
-    advised.target = advice::tumour_target(file->model);
+    target = advice::tumour_target(file->model);
   }
-  if (Status ok = play(*observations, *pipeline, progress, advised); !ok) {
-    return tl::unexpected(ok.error());
-  }
-  auto ranked = advice::rank(*pipeline, file->config, *locator, advised.update.estimate,
-                             *candidates, advised.target);
-  if (!ranked) return tl::unexpected(ranked.error());
-  advised.advice = std::move(*ranked);
-  advised.model = std::move(file->model);
-  return advised;
+  return Adviser(std::unique_ptr<Impl>(new Impl{
+      std::make_shared<const BrainModel>(std::move(file->model)), file->config, std::move(locator),
+      std::move(*pipeline), std::move(*candidates), std::move(target)}));
+}
+
+const std::string& Adviser::model_id() const { return impl_->model->model_id; }
+
+Result<Advised> Adviser::after(const std::filesystem::path& surgery, std::uint64_t count,
+                               const Progress& progress) {
+  return impl_->advise(first_of(surgery, model_id(), count), progress, {});
+}
+
+Result<Advised> Adviser::now(const std::filesystem::path& journal, const SessionKey& session,
+                             const std::map<std::string, std::uint64_t>& used,
+                             std::stop_token stop) {
+  return impl_->advise(used_of(journal, model_id(), session, used), {}, std::move(stop));
 }
 
 std::vector<std::string> advise_lines(const Advised& advised) {
@@ -175,8 +250,8 @@ std::string advise_json(const Advised& advised) {
     candidates.push_back(std::move(entry));
   }
   const nlohmann::json json = {
-      {"case", advised.model.case_id},
-      {"model_id", advised.model.model_id},
+      {"case", advised.model->case_id},
+      {"model_id", advised.model->model_id},
       {"observations", advised.played},
       {"sources", advised.sources},
       {"quality", std::string(to_string(advised.update.estimate.quality.quality))},

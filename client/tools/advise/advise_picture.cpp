@@ -34,8 +34,8 @@ cv::Scalar sweep_colour(const Advised& advised, const Vec3& x, double most_mm) {
 }  // namespace
 
 Status draw_advice(const Advised& advised, const std::filesystem::path& out) {
-  const TriangleSurface& tumour = advised.model.tumour;
-  const TriangleSurface opening = registration::craniotomy_patch(advised.model).surface;
+  const TriangleSurface& tumour = advised.model->tumour;
+  const TriangleSurface opening = registration::craniotomy_patch(*advised.model).surface;
   const double most_mm = std::max(1e-3, advised.advice.front().reduction_mm());
   std::vector<cv::Scalar> colours;
   for (int t = 0; t < tumour.num_triangles(); ++t) {
@@ -50,7 +50,7 @@ Status draw_advice(const Advised& advised, const std::filesystem::path& out) {
   if (opening.num_vertices() > 0) outward = opening.vertices.rowwise().mean() - inside;
 
   Sheet sheet;
-  sheet.title = "Case " + advised.model.case_id + ": what to measure next";
+  sheet.title = "Case " + advised.model->case_id + ": what to measure next";
   sheet.subtitle = "sd at the " + advised.target.name + " now " +
                    fixed_decimals(advised.advice.front().before_mm, 2) +
                    " mm; best: " + advised.advice.front().candidate.name + ", " +

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include <CLI/CLI.hpp>
+#include <cstdint>
 #include <cstdio>
 #include <filesystem>
 #include <memory>
@@ -14,7 +15,9 @@ namespace brainshift::client {
 namespace {
 
 struct AdviseArguments {
-  AdviseOptions options;
+  std::filesystem::path surgery;
+  std::uint64_t observations = 0;
+  AdviserOptions options;
   std::string boundary = "contact";
   std::vector<double> target;
   std::filesystem::path picture;
@@ -22,7 +25,7 @@ struct AdviseArguments {
 };
 
 Status run_advise(AdviseArguments& arguments) {
-  AdviseOptions& options = arguments.options;
+  AdviserOptions& options = arguments.options;
   if (!arguments.picture.empty()) {
     if (Status ok = io::check_output_file("--picture", arguments.picture); !ok) return ok;
   }
@@ -31,7 +34,10 @@ Status run_advise(AdviseArguments& arguments) {
     options.target_mm = Vec3(arguments.target[0], arguments.target[1], arguments.target[2]);
     if (!options.target_mm->allFinite()) return invalid("--target must be three numbers, mm");
   }
-  const auto advised = advise(options, terminal_progress());
+  auto adviser = Adviser::open(options);
+  if (!adviser) return tl::unexpected(adviser.error());
+  const auto advised =
+      adviser->after(arguments.surgery, arguments.observations, terminal_progress());
   if (!advised) return tl::unexpected(advised.error());
   if (arguments.json) {
     std::fputs(advise_json(*advised).c_str(), stdout);
@@ -50,11 +56,11 @@ void add_advise(CLI::App& app, Status& status) {
   auto arguments = std::make_shared<AdviseArguments>();
   CLI::App* command = app.add_subcommand(
       "advise", "Rank what to measure next by how much it reduces the error at a target.");
-  AdviseOptions& options = arguments->options;
-  command->add_option("surgery", options.surgery, "surgery file or journal")->required();
+  AdviserOptions& options = arguments->options;
+  command->add_option("surgery", arguments->surgery, "surgery file or journal")->required();
   add_required(*command, "--model", options.model, "the model file that it was recorded with");
   command
-      ->add_option("--observations", options.observations,
+      ->add_option("--observations", arguments->observations,
                    "play only the first so many observations of the file")
       ->check(CLI::PositiveNumber);
   add_with_default(*command, "--boundary", arguments->boundary, "brain-skull boundary condition")

@@ -42,10 +42,14 @@ void add_view(CLI::App& app, Status& status) {
                    "where the browser finds the page, on this computer; port 0: a free one");
   command->add_option("--model", arguments->options.model,
                       "the daemon's model file, to draw the MRI that its case names");
+  command->add_option("--journal", arguments->options.journal,
+                      "the daemon's journal_dir: the page can say where to measure next (takes the "
+                      "model's memory once more when it is asked)");
   command->footer(
       R"(It starts no session, sends no observation and writes nothing. Examples:
   brainshift view --model colin27.h5
       then open http://127.0.0.1:8080/
+  brainshift view --model colin27.h5 --journal journal
   brainshift view --endpoint tcp://127.0.0.1:5555 --listen 127.0.0.1:9000
 From another computer: ssh -L 8080:127.0.0.1:8080 HOST, and the same address there.)");
   command->callback([arguments, &status] { status = run_view(*arguments); });

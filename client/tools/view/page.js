@@ -37,6 +37,7 @@ let announcedAt = 0;     // when the newest event's field was first heard of
 let history = { of: "", count: -1, points: [] };
 let cross = [0, 0, 0];   // p of the three slices
 let loading = false;
+let advice = null;       // { of, target, before_mm, candidates } or { of, reason }; asked for while its box is checked
 
 function colours(stops) {
   const table = new Uint8Array(3 * 256);
@@ -185,6 +186,82 @@ function listen() {
   };
 }
 
+// ---------- where to measure next ----------
+
+const ADVICE_MS = 700, NUMBERED = 5;
+let asking = false;
+async function askForAdvice() {
+  if (asking || !state?.advises || !byId("advice").checked) return;
+  asking = true;
+  try {
+    const answer = await (await get("advice")).json(), of = answer.of ?? "";
+    if (of === (advice?.of ?? "")) return;
+    advice = of ? answer : null;
+    tellAdvice();
+    draw();
+  } catch (error) {
+    console.warn(String(error));  // asked again soon
+  } finally {
+    asking = false;
+  }
+}
+// Of the field on the screen; an older one's stays for as long as it is worked out anew, and says so.
+function standingAdvice() {
+  const of = drawable();
+  return of && advice?.candidates && byId("advice").checked && advice.of.startsWith(state.session + ".") ? advice : null;
+}
+function tellAdvice() {
+  byId("advice-list").hidden = !byId("advice").checked;
+  const shown = standingAdvice(), caption = byId("advice-caption");
+  if (!shown) {
+    caption.textContent = `Where to measure next: ${advice?.reason ?? (drawable() ? "being computed" : "no field")}`;
+  } else {
+    const update = shown.of.split(".").at(-1), newer = shown.of === state.field ? "" : `, of update ${update}`;
+    caption.textContent = `Where to measure next: sd at the ${shown.target} ${shown.before_mm.toFixed(2)} mm now${newer}`;
+    if (!shown.candidates.some((one) => one.less_mm >= 0.005)) caption.textContent += "; none of these would take off 0.01 mm";
+  }
+  rows(byId("advice-rows"), shown ? shown.candidates.slice(0, NUMBERED) : [], (one) => {
+    const row = document.createElement("tr"), cells = [0, 1, 2].map(() => document.createElement("td"));
+    const button = Object.assign(document.createElement("button"), { textContent: `${shown.candidates.indexOf(one) + 1} ${one.name}`, title: "Move the cross there" });
+    button.addEventListener("click", () => { cross = placeNow(one.where_mm); draw(); });
+    cells[0].append(button);
+    cells[1].textContent = one.less_mm.toFixed(2);
+    cells[2].textContent = one.sd_mm.toFixed(2);
+    row.append(...cells);
+    return row;
+  });
+}
+// Where a place of the MRI is in the brain that is drawn.
+function placeNow(x) {
+  const of = chosen("brain") === "now" ? drawable() : null, u = [0, 0, 0];
+  if (of) displacement(of, x[0], x[1], x[2], u);
+  return x.map((v, c) => v + u[c]);
+}
+// The best, numbered: filled in the slice's plane, hollow where the place lies in front of or behind it.
+function drawAdvice(context, plane) {
+  const shown = standingAdvice();
+  if (!shown) return;
+  context.font = "bold 12px system-ui, sans-serif";
+  context.textAlign = "center";
+  context.textBaseline = "middle";
+  for (let i = Math.min(NUMBERED, shown.candidates.length); i-- > 0;) {
+    const p = placeNow(shown.candidates[i].where_mm), [x, y] = toPixel(plane, p);
+    const away = Math.abs(p[plane.normal] - cross[plane.normal]);
+    context.globalAlpha = away < 4 ? 1 : 0.45;
+    context.beginPath();
+    context.arc(x, y, 9, 0, 2 * Math.PI);
+    context.fillStyle = away < 4 ? "#ffb000" : "#00000080";
+    context.fill();
+    context.strokeStyle = "#ffb000";
+    context.lineWidth = 1.5;
+    context.stroke();
+    context.fillStyle = away < 4 ? "#000" : "#ffb000";
+    context.fillText(String(i + 1), x, y + 0.5);
+  }
+  context.globalAlpha = 1;
+  context.textBaseline = "alphabetic";
+}
+
 // ---------- whether it may be shown ----------
 
 // "live", "grey": show it, but not as current; "none": there is no field to show.
@@ -259,6 +336,8 @@ function tell() {
   });
   rows(byId("left-out"), state.left_out, (each) => Object.assign(document.createElement("li"), {
     textContent: `${each.part}: ${each.reason}${each.error ? " (" + each.error + ")" : ""}` }));
+  byId("advice-label").hidden = !state.advises;
+  tellAdvice();
 }
 
 // ---------- between the voxels ----------
@@ -425,6 +504,7 @@ function drawSlice(canvas, plane, of, map, now) {
     context.setLineDash([]);
     if (of) drawSection(context, plane, model.tumour.triangles, of.vertices, "#ff5ad1", 2);
   }
+  drawAdvice(context, plane);
   if (byId("cross").checked) {
     const [cx, cy] = toPixel(plane, cross);
     context.strokeStyle = "#ffffff90";
@@ -629,5 +709,7 @@ if (!surface) byId("surface-from").textContent = "3-D: this browser has no WebGL
 for (const input of document.querySelectorAll("input")) input.addEventListener("change", draw);
 window.addEventListener("resize", () => { if (model) drawStrips(); });
 matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => { if (model) drawStrips(); });
+byId("advice").addEventListener("change", () => { tellAdvice(); askForAdvice(); });
+setInterval(askForAdvice, ADVICE_MS);
 setInterval(judge, 100);
 listen();

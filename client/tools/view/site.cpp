@@ -105,7 +105,8 @@ std::string to_json(const PageState& state, double clock_ms) {
                   {"shown", state.shown ? json_of(*state.shown) : Json(nullptr)},
                   {"sources", sources},
                   {"left_out", left_out},
-                  {"history", state.history}});
+                  {"history", state.history},
+                  {"advises", state.advises}});
 }
 
 std::string to_json(const std::deque<HistoryPoint>& points) {
@@ -137,7 +138,7 @@ void Site::show_model(const std::string& model_id, std::string json, std::string
   model_ = shared(std::move(json));
   inside_ = shared(std::move(inside));
   mri_ = mri ? shared(std::move(*mri)) : nullptr;
-  field_ = history_ = nullptr;
+  field_ = history_ = advice_ = nullptr;
 }
 
 void Site::show_field(const std::string& of, std::string bytes) {
@@ -151,6 +152,13 @@ void Site::show_history(const std::string& session, std::string json) {
   history_of_ = session;
   history_ = shared(std::move(json));
 }
+
+void Site::show_advice(std::string json) {
+  const std::lock_guard lock(mutex_);
+  advice_ = shared(std::move(json));
+}
+
+void Site::on_advice_asked(std::function<void()> asked) { advice_asked_ = std::move(asked); }
 
 void Site::publish(std::string state) {
   {
@@ -169,6 +177,7 @@ std::optional<HttpAnswer> Site::get(std::string_view path) const {
   if (path == "/page.css") return page("text/css; charset=utf-8", kPageStyle);
   if (path == "/page.js") return page("text/javascript; charset=utf-8", kPageScript);
   if (path == "/surface.js") return page("text/javascript; charset=utf-8", kSurfaceScript);
+  if (path == "/advice" && advice_asked_) advice_asked_();
   const std::lock_guard lock(mutex_);
   const auto held = [](const char* type, const Body& body,
                        const std::string& of) -> std::optional<HttpAnswer> {
@@ -180,6 +189,9 @@ std::optional<HttpAnswer> Site::get(std::string_view path) const {
   if (path == "/mri") return held(kBytesType, mri_, model_id_);
   if (path == "/field") return held(kBytesType, field_, field_of_);
   if (path == "/history") return held(kJsonType, history_, history_of_);
+  if (path == "/advice" && advice_asked_) {
+    return HttpAnswer{kJsonType, advice_ ? advice_ : shared("{}"), ""};
+  }
   return std::nullopt;
 }
 

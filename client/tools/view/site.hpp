@@ -9,11 +9,14 @@
 //   /inside      a byte per voxel of the field's grid: 1 in the brain; Of: model_id
 //   /mri         GreyVolume::voxels, where an MRI was given; Of: model_id
 //   /field       FieldVolume::Encoded, of the newest usable update alone; Of: PageState::field
+//   /advice      JSON: what to measure next (page_advice.hpp), where there is a journal; asking for
+//                it has it computed of the field that is shown, and it is empty until then
 //   /history     JSON: an array of the session's updates, the newest last; Of: session
 #pragma once
 
 #include <condition_variable>
 #include <deque>
+#include <functional>
 #include <limits>
 #include <mutex>
 #include <optional>
@@ -68,6 +71,7 @@ struct PageState {
   std::vector<SourceLine> sources;
   std::vector<Omission> left_out;
   std::uint64_t history = 0;  // counts the points of /history ever made
+  bool advises = false;       // there is /advice
 };
 // One line. clock_ms: of the publisher, so that a page notices events that wait in a queue.
 std::string to_json(const PageState& state, double clock_ms);
@@ -83,7 +87,10 @@ class Site {
                   std::optional<std::string> mri);
   void show_field(const std::string& of, std::string bytes);
   void show_history(const std::string& session, std::string json);
+  void show_advice(std::string json);
   void publish(std::string state);
+  // Called on the server's threads whenever a page asks for /advice. Before source() is used.
+  void on_advice_asked(std::function<void()> asked);
 
   // For a server that does not outlive this.
   HttpSource source();
@@ -96,7 +103,8 @@ class Site {
   mutable std::mutex mutex_;
   std::condition_variable changed_;
   std::string model_id_, field_of_, history_of_;
-  Body model_, inside_, mri_, field_, history_;
+  Body model_, inside_, mri_, field_, history_, advice_;
+  std::function<void()> advice_asked_;
   HttpEvent event_;
 };
 

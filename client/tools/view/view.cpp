@@ -13,6 +13,7 @@
 
 #include "client/lib/client.hpp"
 #include "client/tools/view/http_server.hpp"
+#include "client/tools/view/page_advice.hpp"
 #include "client/tools/view/site.hpp"
 #include "client/tools/view/volumes.hpp"
 #include "common/core/stopwatch.hpp"
@@ -67,6 +68,11 @@ class Viewer {
          const std::function<void(const std::string&)>& tell)
       : options_(options), head_(std::move(head)), site_(site), tell_(tell) {
     state_.endpoint = options.endpoint;
+    if (options.journal.empty()) return;
+    state_.advises = true;
+    advice_.emplace(options.model, options.journal,
+                    [&site](std::string json) { site.show_advice(std::move(json)); });
+    site.on_advice_asked([this] { advice_->ask(); });
   }
 
   Status run(const std::function<bool()>& stopped) {
@@ -157,6 +163,7 @@ class Viewer {
     used_.clear();
     ++state_.history;
     site_.show_history(next, to_json(points_));
+    if (advice_) advice_->show_nothing();
   }
 
   Status look(Client& client, Client& reporter) {
@@ -239,6 +246,17 @@ class Viewer {
     state_.shown = history_point(message, tumour_);
     state_.left_out = update.left_out;
     used_ = update.estimate.sources;
+    if (advice_) ask_for_advice(message);
+  }
+
+  void ask_for_advice(const UpdateMessage& message) {
+    ShownField shown{state_.field,
+                     {message.boot_id, message.session_id, state_.model_id},
+                     message.update.boundary,
+                     {}};
+    for (const SourceSummary& source : used_)
+      shown.used.emplace(source.source, source.observation_sequence);
+    advice_->show(std::move(shown));
   }
 
   void count(const wire::DaemonReport& report) {
@@ -300,6 +318,7 @@ class Viewer {
   Stopwatch since_published_;
   Stopwatch since_report_;
   std::optional<Stopwatch> superseded_;
+  std::optional<PageAdvice> advice_;  // with a journal
 };
 
 }  // namespace
@@ -312,13 +331,20 @@ Status view(const ViewOptions& options, const std::function<bool()>& stopped,
     if (!read) return tl::unexpected(read.error());
     head = std::move(*read);
   }
+  if (!options.journal.empty()) {
+    if (options.model.empty()) return invalid("--journal needs --model");
+    if (std::error_code none; !std::filesystem::is_directory(options.journal, none)) {
+      return fail(ErrorCode::kNotFound, "--journal: " + options.journal.string() + " is no folder");
+    }
+  }
   Site site;
+  Viewer viewer(options, std::move(head), site, tell);  // before the server, which asks it
   const auto server = HttpServer::listen(options.listen, site.source());
   if (!server) return tl::unexpected(server.error());
   Address address = options.listen;
   address.port = static_cast<std::uint16_t>(server->port());
   tell("http://" + to_string(address) + "/   (Ctrl-C ends it)");
-  return Viewer(options, std::move(head), site, tell).run(stopped);
+  return viewer.run(stopped);
 }
 
 }  // namespace brainshift::client

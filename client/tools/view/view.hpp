@@ -23,6 +23,9 @@ struct ViewOptions {
   Address listen{"127.0.0.1", 8080};
   // Whose MRI is drawn; empty: the field is drawn on the brain's outline.
   std::filesystem::path model;
+  // The daemon's journal_dir, for advice on what to measure next (page_advice.hpp); empty: none.
+  // Needs `model`.
+  std::filesystem::path journal;
   std::optional<ClientKeys> keys = std::nullopt;
 };
 

@@ -26,6 +26,10 @@ constexpr const char* kInsert =
 constexpr const char* kSelect =
     "SELECT id, kind, sequence, recorded_ns, payload, crc FROM record ORDER BY id";
 
+constexpr const char* kSelectNewest =
+    "SELECT a.id, a.kind, a.sequence, a.recorded_ns, a.payload, a.crc, b.crc FROM record a "
+    "LEFT JOIN record b ON b.id = a.id - 1 WHERE a.kind = ?1 ORDER BY a.id DESC";
+
 // SQLite integers are signed; a sequence beyond them would come back negative.
 bool fits(std::uint64_t sequence) {
   return sequence <= static_cast<std::uint64_t>(std::numeric_limits<std::int64_t>::max());
@@ -334,6 +338,28 @@ Result<std::vector<SurgeryRecord>> SurgeryFile::records(RecordKind kind) const {
   });
   if (!status) return tl::unexpected(status.error());
   return records;
+}
+
+Status SurgeryFile::newest_first(
+    RecordKind kind, const std::function<Result<bool>(const SurgeryRecord&)>& visitor) const {
+  const SqliteDatabase& database = impl_->database;
+  if (database.handle() == nullptr) return database.read_failure("records");
+  Statement select(database.handle(), kSelectNewest);
+  select.bind_text(1, to_string(kind));
+  while (select.row()) {
+    const auto id = static_cast<std::uint64_t>(select.integer(0));
+    const SurgeryRecord record{kind, static_cast<std::uint64_t>(select.integer(2)),
+                               select.integer(3), select.bytes(4)};
+    const auto before =
+        id == 1 ? impl_->header.chain_start : static_cast<std::uint32_t>(select.integer(6));
+    if (select.integer(5) != std::int64_t{chain_link(before, record)}) {
+      return impl_->broken(id, "the checksum does not match; it, or the one before, was changed");
+    }
+    const auto more = visitor(record);
+    if (!more) return tl::unexpected(more.error());
+    if (!*more) return {};
+  }
+  return select.ok() ? Status() : Status(database.read_failure("records"));
 }
 
 Result<SurgeryTruth> SurgeryFile::read_truth(std::uint64_t observation_sequence) const {

@@ -92,6 +92,11 @@ class SurgeryFile {
   Status visit(const std::function<Status(const SurgeryRecord&)>& visitor) const;
   // The records of a kind, in order; an error when any record of the file is not what was written.
   Result<std::vector<SurgeryRecord>> records(RecordKind kind) const;
+  // Hands over the records of a kind from the newest backwards for as long as the visitor says
+  // true, each one after its checksum has been compared with the record before it. What lies
+  // before the last one is not read: of a running journal, without its hours.
+  Status newest_first(RecordKind kind,
+                      const std::function<Result<bool>(const SurgeryRecord&)>& visitor) const;
   // kNotFound when the surgery carries no truth for that observation (a real recording).
   Result<SurgeryTruth> read_truth(std::uint64_t observation_sequence) const;
 

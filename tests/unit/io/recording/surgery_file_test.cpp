@@ -163,6 +163,32 @@ TEST_F(SurgeryFileTest, ALiveFileCanBeReadWhileItIsWritten) {
   EXPECT_EQ(reader.records(RecordKind::kObservation).value().size(), 2u);
 }
 
+TEST_F(SurgeryFileTest, TheNewestComeFirstAndWhatLiesBeforeThemIsNotRead) {
+  SurgeryFile file = make();
+  for (std::uint64_t i = 1; i <= 6; ++i) {
+    ASSERT_TRUE(
+        file.append(record(i, i % 2 == 0 ? RecordKind::kUpdate : RecordKind::kObservation)));
+  }
+  std::vector<std::uint64_t> seen;
+  const auto until = [&](std::uint64_t last) {
+    seen.clear();
+    return value_or_fail(SurgeryFile::open(path))
+        .newest_first(RecordKind::kObservation, [&](const SurgeryRecord& one) -> Result<bool> {
+          EXPECT_EQ(one.payload, record(one.sequence).payload);
+          seen.push_back(one.sequence);
+          return one.sequence > last;
+        });
+  };
+  EXPECT_TRUE(until(0));
+  EXPECT_THAT(seen, testing::ElementsAre(5, 3, 1));
+  tamper("UPDATE record SET payload = x'00' WHERE id = 2");  // the one before record 3
+  EXPECT_TRUE(until(3));
+  EXPECT_THAT(seen, testing::ElementsAre(5, 3));
+  tamper("UPDATE record SET payload = x'00' WHERE id = 3");
+  expect_error(until(1), ErrorCode::kUnreadable, "record 3: the checksum does not match");
+  EXPECT_THAT(seen, testing::ElementsAre(5));
+}
+
 TEST_F(SurgeryFileTest, AcknowledgedRecordsSurviveAKill) {
   const pid_t child = ::fork();
   ASSERT_GE(child, 0);

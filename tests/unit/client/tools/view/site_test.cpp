@@ -77,5 +77,20 @@ TEST(Site, AnotherModelTakesFieldAndMriAway) {
                source.get("/history").has_value());
 }
 
+TEST(Site, HasAdviceComputedOnlyWhereAPageAsks) {
+  Site without;
+  EXPECT_FALSE(without.source().get("/advice"));
+  Site site;
+  int asked = 0;
+  site.on_advice_asked([&] { ++asked; });
+  const HttpSource source = site.source();
+  source.get("/model");
+  EXPECT_EQ(asked, 0);
+  EXPECT_EQ(*source.get("/advice")->body, "{}");
+  EXPECT_EQ(asked, 1);
+  site.show_advice("{\"of\":\"1.2.3\"}");
+  EXPECT_EQ(*source.get("/advice")->body, "{\"of\":\"1.2.3\"}");
+}
+
 }  // namespace
 }  // namespace brainshift::client
