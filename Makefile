@@ -6,7 +6,7 @@ JOBS   ?= $(shell nproc)
 BUILD  := build/$(PRESET)
 
 .DEFAULT_GOAL := help
-.PHONY: help setup configure build demo test test-kernels studies bench verify stability sensing interchange surgeries evidence ablations replays calculix prior advice page faults scaling fuzz documents format format-check tidy packages image clean
+.PHONY: help setup configure build demo test test-kernels studies bench verify stability sensing interchange surgeries evidence ablations replays calculix prior advice page faults scaling cohort fuzz documents format format-check tidy packages image clean
 
 help: ## list the targets
 	@sed -n 's/^\([a-z-]*\):.*## \(.*\)/  make \1|\2/p' $(MAKEFILE_LIST) | column -t -s '|' 2>/dev/null \
@@ -104,6 +104,12 @@ scaling: setup ## preparing a model by one process and by several (MPI), measure
 	@cmake --preset $(PRESET) --log-level=WARNING -DBRAINSHIFT_MPI=ON
 	cmake --build --preset $(PRESET) -j $(JOBS) --target scaling_programs
 	cmake/scripts/scaling.sh $(BUILD)
+
+cohort: setup ## brainshift-bids on real heads (BRAINSHIFT_EXTERNAL_DATA), into out/cohort; SUBJECTS=N, ENGINES=1: Snakemake and Slurm too
+	@docker/install-packages.sh docker/packages-cohort.txt
+	@cmake --preset $(PRESET) --log-level=WARNING
+	cmake --build --preset $(PRESET) -j $(JOBS) --target brainshiftd brainshift python_client
+	cmake/scripts/cohort.sh $(BUILD)
 
 documents: configure ## what docs/slicer.md, python.md and cpp.md say, typed as written; needs THROWAWAY=1, since it installs
 	cmake --build --preset $(PRESET) -j $(JOBS) --target brainshiftd brainshift python_client
