@@ -2,6 +2,7 @@
 #include "common/geometry/mask.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cassert>
 #include <cmath>
 #include <cstddef>
@@ -138,6 +139,49 @@ void fill_cavities(Binary& voxels, const std::array<int, 3>& dims) {
   });
 }
 
+// An image of zeros and ones with room for the ball around it.
+struct Padded {
+  std::array<int, 3> dims{};
+  std::array<std::ptrdiff_t, 3> step{};  // to the next voxel of each axis
+  Binary voxels;
+};
+
+// Steps to the voxels of the ball, itself left out.
+std::vector<std::ptrdiff_t> ball(const Eigen::Matrix3d& mm_per_voxel,
+                                 const std::array<int, 3>& reach, const Padded& image,
+                                 double radius_mm) {
+  std::vector<std::ptrdiff_t> steps;
+  for (int k = -reach[2]; k <= reach[2]; ++k)
+    for (int j = -reach[1]; j <= reach[1]; ++j)
+      for (int i = -reach[0]; i <= reach[0]; ++i) {
+        const double distance = (mm_per_voxel * Vec3(i, j, k)).norm();
+        if (distance > 0.0 && distance <= radius_mm)
+          steps.push_back(i * image.step[0] + j * image.step[1] + k * image.step[2]);
+      }
+  return steps;
+}
+
+// Sets what lies within the ball of a voxel that equals `value` to it; at least `margin` voxels from
+// the border. It is enough to look from the voxels beside others.
+void grow(Padded& image, const std::vector<std::ptrdiff_t>& ball, const std::array<int, 3>& margin,
+          std::uint8_t value) {
+  const Binary before = image.voxels;
+  for (int k = margin[2]; k < image.dims[2] - margin[2]; ++k)
+    for (int j = margin[1]; j < image.dims[1] - margin[1]; ++j)
+      for (int i = margin[0]; i < image.dims[0] - margin[0]; ++i) {
+        const std::ptrdiff_t at = i * image.step[0] + j * image.step[1] + k * image.step[2];
+        const auto is = [&](std::ptrdiff_t step) {
+          return before[static_cast<std::size_t>(at + step)] == value;
+        };
+        if (!is(0)) continue;
+        bool inner = true;
+        for (const std::ptrdiff_t step : image.step) inner = inner && is(step) && is(-step);
+        if (inner) continue;
+        for (const std::ptrdiff_t step : ball)
+          image.voxels[static_cast<std::size_t>(at + step)] = value;
+      }
+}
+
 // Weights of offsets 0..radius of a normalised symmetric Gaussian.
 std::vector<float> half_kernel(double sigma_voxels) {
   const int radius = std::max(1, static_cast<int>(std::ceil(3.5 * sigma_voxels)));
@@ -230,6 +274,42 @@ MaskParts mask_parts(const VoxelImage& image) {
               number[components.root(r)]);
   });
   return parts;
+}
+
+VoxelImage close_gaps(const VoxelImage& image, double radius_mm) {
+  assert(image.values.size() == image.num_voxels());
+  assert(radius_mm >= 0.0);
+  const Eigen::Matrix3d mm_per_voxel = image.T_ras_voxel.linear();
+  std::array<int, 3> reach{}, room{};
+  Padded padded;
+  for (int a = 0; a < 3; ++a) {
+    // Of a skewed grid: as far as the ball reaches across the planes of the other two axes.
+    const double height = 1.0 / mm_per_voxel.inverse().row(a).norm();
+    const auto axis = static_cast<std::size_t>(a);
+    reach[axis] = static_cast<int>(std::floor(radius_mm / height + 1e-9));
+    room[axis] = 2 * reach[axis] + 1;
+    padded.dims[axis] = image.dims[axis] + 2 * room[axis];
+  }
+  padded.step = {1, padded.dims[0], std::ptrdiff_t{padded.dims[0]} * padded.dims[1]};
+  padded.voxels.assign(static_cast<std::size_t>(padded.step[2] * padded.dims[2]), 0);
+  const auto each = [&](auto visit) {
+    std::size_t v = 0;
+    for (int k = 0; k < image.dims[2]; ++k)
+      for (int j = 0; j < image.dims[1]; ++j)
+        for (int i = 0; i < image.dims[0]; ++i, ++v)
+          visit(v, static_cast<std::size_t>((i + room[0]) * padded.step[0] +
+                                            (j + room[1]) * padded.step[1] +
+                                            (k + room[2]) * padded.step[2]));
+  };
+  each([&](std::size_t v, std::size_t p) { padded.voxels[p] = image.values[v] > 0.0f ? 1 : 0; });
+  const auto steps = ball(mm_per_voxel, reach, padded, radius_mm);
+  const std::array<int, 3> margin{reach[0] + 1, reach[1] + 1, reach[2] + 1};
+  grow(padded, steps, margin, 1);
+  // What was set lies a reach inside of the border, so that its outside has room too.
+  grow(padded, steps, {std::max(1, reach[0]), std::max(1, reach[1]), std::max(1, reach[2])}, 0);
+  VoxelImage closed{image.dims, image.T_ras_voxel, std::vector<float>(image.values.size())};
+  each([&](std::size_t v, std::size_t p) { closed.values[v] = padded.voxels[p]; });
+  return closed;
 }
 
 VoxelImage gaussian_smooth(const VoxelImage& image, double sigma_mm) {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Brain masks: threshold, largest component, smoothing.
+// Brain masks: threshold, largest component, closing, smoothing.
 #pragma once
 
 #include <cstdint>
@@ -23,6 +23,11 @@ struct MaskParts {
   std::vector<std::size_t> voxels;          // of each part
 };
 MaskParts mask_parts(const VoxelImage& image);
+
+// Morphological closing (Serra 1982, Image Analysis and Mathematical Morphology) by a ball of
+// radius_mm >= 0: 1 where the voxel is > 0, or where no ball that avoids all such voxels reaches;
+// else 0. Gaps narrower than twice the radius are filled. Voxels beyond the image are 0.
+VoxelImage close_gaps(const VoxelImage& image, double radius_mm);
 
 // Gaussian smoothing with standard deviation sigma_mm >= 0 (per axis, mm). Voxels outside the
 // image count as zero. Separable along the voxel axes, cut off at 3.5 sigma and normalised;

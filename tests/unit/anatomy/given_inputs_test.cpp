@@ -59,6 +59,33 @@ TEST(BrainMask, TakesVoxelsAboveZeroWhateverTheyAndTheBackgroundAre) {
   EXPECT_EQ(value_or_fail(brain_mask(stripped, "m", nullptr)).values, ball.values);
 }
 
+TEST(BrainMask, ThatFollowsTheSulciIsFilledAndSaysSo) {
+  const VoxelImage ball = balls({{Vec3::Zero(), 20.0}});
+  const auto with_slots = [&](int every) {
+    VoxelImage image = ball;
+    std::size_t v = 0;
+    for (int k = 0; k < image.dims[2]; ++k)
+      for (int j = 0; j < image.dims[1]; ++j)
+        for (int i = 0; i < image.dims[0]; ++i, ++v)
+          if (i % every < 2 && j > image.dims[1] / 2) image.values[v] = 0.0F;
+    return image;
+  };
+  const auto voxels = [](const VoxelImage& image) {
+    return std::accumulate(image.values.begin(), image.values.end(), 0.0);
+  };
+  Notes notes;
+  const VoxelImage mask = value_or_fail(brain_mask(with_slots(8), "m", &notes));
+  EXPECT_THAT(notes, ElementsAre(AllOf(HasSubstr("m: follows the sulci; gaps of less than 6 mm"),
+                                       HasSubstr("% to the brain's volume"))));
+  EXPECT_GT(voxels(mask), 0.97 * voxels(ball));
+  EXPECT_LE(voxels(mask), 1.001 * voxels(ball));
+  // One fissure is no mask that follows the sulci.
+  notes.clear();
+  const VoxelImage one = with_slots(100);
+  EXPECT_EQ(value_or_fail(brain_mask(one, "m", &notes)).values, one.values);
+  EXPECT_THAT(notes, IsEmpty());
+}
+
 TEST(BrainMask, ASoftMaskCountsFromHalfItsPlateau) {
   for (const float plateau : {1.0F, 100.0F}) {
     VoxelImage image = soft_ball(20.0);

@@ -175,6 +175,44 @@ TEST(LargestComponent, AnImageWithoutVoxelsIsEmpty) {
   refusal_of(largest_component(VoxelImage{}), ErrorCode::kEmptySet);
 }
 
+TEST(CloseGaps, FillsWhatIsNarrowerThanTheBallAndNothingElse) {
+  for (const double voxel_mm : {1.0, 0.5}) {
+    const auto voxels = [&](double mm) { return static_cast<int>(std::lround(mm / voxel_mm)); };
+    VoxelImage image = image_of(voxels(60), voxels(20), voxels(20));
+    image.T_ras_voxel.linear() *= voxel_mm;
+    // Up to the image's border, with slots of 4 and 8 mm.
+    fill_box(image, {0, 0, 0}, {voxels(20), voxels(20), voxels(20)}, 1.0f);
+    fill_box(image, {voxels(24), 0, 0}, {voxels(40), voxels(20), voxels(20)}, 1.0f);
+    fill_box(image, {voxels(48), 0, 0}, {voxels(60), voxels(20), voxels(20)}, 1.0f);
+    VoxelImage filled = image;
+    // A slot's mouth stays a little hollow: the ball is round.
+    fill_box(filled, {voxels(20), voxels(3), voxels(3)}, {voxels(24), voxels(17), voxels(17)},
+             1.0f);
+    const VoxelImage closed = close_gaps(image, 3.0);
+    for (std::size_t v = 0; v < filled.values.size(); ++v) {
+      ASSERT_GE(closed.values[v], filled.values[v]) << v;
+    }
+    for (int k = 0; k < image.dims[2]; ++k)
+      for (int j = 0; j < image.dims[1]; ++j)
+        for (int i = voxels(40); i < voxels(48); ++i) {
+          ASSERT_EQ(closed.at(i, j, k), 0.0f) << i << ' ' << j << ' ' << k;
+        }
+    EXPECT_EQ(close_gaps(image, 0.0).values, image.values);
+    EXPECT_EQ(close_gaps(closed, 3.0).values, closed.values) << "closing twice is closing once";
+  }
+}
+
+TEST(CloseGaps, MeasuresMillimetresOfAnObliqueGridThatIsNoCube) {
+  VoxelImage image = image_of(40, 40, 20);
+  image.T_ras_voxel.linear() =
+      Eigen::AngleAxisd(0.6, Vec3(1, 2, 3).normalized()).toRotationMatrix() *
+      Vec3(1.0, 1.0, 2.0).asDiagonal();
+  fill_box(image, {5, 5, 4}, {35, 35, 8}, 1.0f);
+  fill_box(image, {5, 5, 10}, {35, 35, 16}, 1.0f);  // a gap of 2 voxels, 4 mm
+  EXPECT_EQ(close_gaps(image, 1.5).at(20, 20, 8), 0.0f);
+  EXPECT_EQ(close_gaps(image, 3.0).at(20, 20, 8), 1.0f);
+}
+
 TEST(GaussianSmooth, TurnsAStepIntoTheNormalDistribution) {
   VoxelImage image = image_of(60, 40, 40);
   image.T_ras_voxel.linear() = Vec3(0.5, 1.0, 1.0).asDiagonal();
