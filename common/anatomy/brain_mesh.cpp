@@ -304,11 +304,12 @@ Result<TetMesh> generate(const CaseInputs& inputs, const MeshGeneration& setting
   const std::string file = fmt::format("images.brain = '{}'", inputs.config.brain.string());
   if (!inputs.brain) return invalid(file + ": was not read");
   report(progress, "mask", 0.0);
-  const auto component = brain_mask(*inputs.brain, file, notes);
+  auto component = brain_mask(*inputs.brain, file, notes);
   if (!component) return tl::unexpected(component.error());
   if (Status status = check_brain_extent(mask_extent(*component), file); !status)
     return tl::unexpected(status.error());
-  const VoxelImage smooth = geometry::gaussian_smooth(*component, settings.smoothing_mm);
+  const VoxelImage smooth = geometry::gaussian_smooth(
+      without_sulci(std::move(*component), file, notes), settings.smoothing_mm);
   const auto edge_mm = sizing_field(settings, inputs.config.craniotomy, smooth, tumour);
   if (!edge_mm) return tl::unexpected(edge_mm.error());
   auto mesh = regions == nullptr ? geometry::mesh_mask(smooth, *edge_mm, {}, progress)

@@ -84,21 +84,6 @@ VoxelImage from_level(const VoxelImage& image, float level) {
 // sulci: 1 to 2.4 % (docs/decisions/0043-sulci-are-filled.md).
 constexpr double kGap_mm = 3.0, kSulciShare = 0.06;
 
-VoxelImage without_sulci(VoxelImage mask, const std::string& what, Notes* notes) {
-  const auto voxels = [](const VoxelImage& image) {
-    return std::accumulate(image.values.begin(), image.values.end(), 0.0);
-  };
-  const VoxelImage closed = geometry::close_gaps(mask, kGap_mm);
-  const double share = voxels(closed) / voxels(mask) - 1.0;
-  if (share <= kSulciShare) return mask;
-  auto filled = geometry::largest_component(closed);  // pockets that are closed off now
-  if (!filled) return mask;
-  add_note(notes, fmt::format("{}: follows the sulci; gaps of less than {:g} mm are filled, which "
-                              "adds {:.0f} % to the brain's volume",
-                              what, 2.0 * kGap_mm, 100.0 * (voxels(*filled) / voxels(mask) - 1.0)));
-  return std::move(*filled);
-}
-
 std::string place_text(const Vec3& x) {
   return fmt::format("({:.1f}, {:.1f}, {:.1f})", x[0], x[1], x[2]);
 }
@@ -151,7 +136,7 @@ Result<VoxelImage> brain_mask(const VoxelImage& image, const std::string& what, 
     return fail(largest.error().code, fmt::format("{}: {}", what, largest.error().message));
   }
   const geometry::MaskParts parts = geometry::mask_parts(mask);
-  if (parts.voxels.size() < 2) return without_sulci(std::move(*largest), what, notes);
+  if (parts.voxels.size() < 2) return largest;
   std::size_t lost = 0;
   for (std::size_t i = 1; i < parts.voxels.size(); ++i) lost += parts.voxels[i];
   const double to_cc = voxel_mm3(image) / kMm3PerCc;
@@ -165,7 +150,22 @@ Result<VoxelImage> brain_mask(const VoxelImage& image, const std::string& what, 
   add_note(notes,
            fmt::format("{}: parts beside the brain of {:.1f} cc are left out: {}, {:.2f} cc in all",
                        what, first, parts.voxels.size() - 1, static_cast<double>(lost) * to_cc));
-  return without_sulci(std::move(*largest), what, notes);
+  return largest;
+}
+
+VoxelImage without_sulci(VoxelImage mask, const std::string& what, Notes* notes) {
+  const auto voxels = [](const VoxelImage& image) {
+    return std::accumulate(image.values.begin(), image.values.end(), 0.0);
+  };
+  const VoxelImage closed = geometry::close_gaps(mask, kGap_mm);
+  const double share = voxels(closed) / voxels(mask) - 1.0;
+  if (share <= kSulciShare) return mask;
+  auto filled = geometry::largest_component(closed);  // pockets that are closed off now
+  if (!filled) return mask;
+  add_note(notes, fmt::format("{}: follows the sulci; gaps of less than {:g} mm are filled, which "
+                              "adds {:.0f} % to the brain's volume",
+                              what, 2.0 * kGap_mm, 100.0 * (voxels(*filled) / voxels(mask) - 1.0)));
+  return std::move(*filled);
 }
 
 std::string listed_labels(const VoxelImage& image) {

@@ -59,7 +59,7 @@ TEST(BrainMask, TakesVoxelsAboveZeroWhateverTheyAndTheBackgroundAre) {
   EXPECT_EQ(value_or_fail(brain_mask(stripped, "m", nullptr)).values, ball.values);
 }
 
-TEST(BrainMask, ThatFollowsTheSulciIsFilledAndSaysSo) {
+TEST(WithoutSulci, AMaskThatFollowsThemIsFilledAndSaysSo) {
   const VoxelImage ball = balls({{Vec3::Zero(), 20.0}});
   const auto with_slots = [&](int every) {
     VoxelImage image = ball;
@@ -74,7 +74,7 @@ TEST(BrainMask, ThatFollowsTheSulciIsFilledAndSaysSo) {
     return std::accumulate(image.values.begin(), image.values.end(), 0.0);
   };
   Notes notes;
-  const VoxelImage mask = value_or_fail(brain_mask(with_slots(8), "m", &notes));
+  const VoxelImage mask = without_sulci(with_slots(8), "m", &notes);
   EXPECT_THAT(notes, ElementsAre(AllOf(HasSubstr("m: follows the sulci; gaps of less than 6 mm"),
                                        HasSubstr("% to the brain's volume"))));
   EXPECT_GT(voxels(mask), 0.97 * voxels(ball));
@@ -82,7 +82,7 @@ TEST(BrainMask, ThatFollowsTheSulciIsFilledAndSaysSo) {
   // One fissure is no mask that follows the sulci.
   notes.clear();
   const VoxelImage one = with_slots(100);
-  EXPECT_EQ(value_or_fail(brain_mask(one, "m", &notes)).values, one.values);
+  EXPECT_EQ(without_sulci(one, "m", &notes).values, one.values);
   EXPECT_THAT(notes, IsEmpty());
 }
 
