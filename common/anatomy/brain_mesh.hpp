@@ -40,8 +40,8 @@ Result<FittedTumour> fit_tumour(TriangleSurface tumour, const TetMesh& mesh,
 // The key of the case file that gives the tumour: "tumour.ellipsoid", "tumour.label_volume", ...
 const char* tumour_key(const CaseConfig& config);
 
-// Generated: brain_mask, without_sulci (given_inputs.hpp) -> Gaussian -> mesh, with the edge lengths
-// of mesh.generate.
+// Generated: brain_mask, without_sulci (given_inputs.hpp) -> Gaussian -> mesh, with the edges of
+// mesh.generate.
 // tumour_edge_mm applies near the tumour surface. From a refined zone to the rest the edge grows
 // by a third of the distance.
 // Ready: must pass geometry::check_mesh.

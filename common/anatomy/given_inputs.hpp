@@ -31,10 +31,10 @@ Status check_extent(const Vec3& size_mm, const std::string& what, double least_m
 // more than a tenth of the volume. kEmptySet: no voxel > 0.
 Result<VoxelImage> brain_mask(const VoxelImage& image, const std::string& what, Notes* notes);
 
-// A brain_mask that follows the sulci, so that filling gaps narrower than 6 mm adds more than 6 % to
-// its volume, with these gaps filled; noted. Any other as it is. The banks of a sulcus lie against
-// each other, and bridges between them that are thinner than an element of the mesh would turn
-// inside out (docs/decisions/0043-sulci-are-filled.md).
+// A brain_mask that follows the sulci, so that filling gaps narrower than 6 mm adds more than 6 %
+// to its volume, with these gaps filled; noted. Any other as it is. The banks of a sulcus lie
+// against each other, and bridges between them that are thinner than an element of the mesh would
+// turn inside out (docs/decisions/0043-sulci-are-filled.md).
 VoxelImage without_sulci(VoxelImage mask, const std::string& what, Notes* notes);
 
 // Focus of a tumour: a 6-connected part of the voxels with one of the labels.

@@ -161,8 +161,8 @@ std::vector<std::ptrdiff_t> ball(const Eigen::Matrix3d& mm_per_voxel,
   return steps;
 }
 
-// Sets what lies within the ball of a voxel that equals `value` to it; at least `margin` voxels from
-// the border. It is enough to look from the voxels beside others.
+// Sets what lies within the ball of a voxel that equals `value` to it; at least `margin` voxels
+// from the border. It is enough to look from the voxels beside others.
 void grow(Padded& image, const std::vector<std::ptrdiff_t>& ball, const std::array<int, 3>& margin,
           std::uint8_t value) {
   const Binary before = image.voxels;

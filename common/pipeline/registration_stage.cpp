@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numeric>
 #include <vector>
 
 #include "common/core/random.hpp"
@@ -111,6 +112,14 @@ Result<Alignment> align(const Points& points, double observed_sd_mm,
   return alignment;
 }
 
+// The points, or so many of them; the same for the same number of points.
+Points at_most(int wanted, const Points& points) {
+  if (points.cols() <= wanted) return points;
+  std::vector<int> all(static_cast<std::size_t>(points.cols()));
+  std::iota(all.begin(), all.end(), 0);
+  return points(Eigen::all, some_of(all, wanted));
+}
+
 // Displacements by a rigid alignment (paper 2.7).
 RegisteredObservation from_alignment(const Points& points, double sd_mm, Alignment alignment,
                                      int guiding) {
@@ -126,10 +135,11 @@ bool follows_deformation(SurfaceGuidance guidance, Method method) {
   return guidance == SurfaceGuidance::kDistances && method == Method::kCondensed;
 }
 
-Result<RegisteredObservation> from_boundary(const TumourBoundary& body,
+Result<RegisteredObservation> from_boundary(const TumourBoundary& observed,
                                             const RegistrationTargets& targets,
                                             const CaseConfig& config, Method method,
                                             const std::stop_token& stop) {
+  const TumourBoundary body{at_most(kMostAligned, observed.points), observed.sd_mm};
   const auto target = targets.tumour_distance
                           ? registration::TargetSurface(*targets.tumour_distance)
                           : registration::TargetSurface(targets.tumour->surface().at_rest());
@@ -189,8 +199,8 @@ Result<RegisteredObservation> from_surface(const CorticalSurface& body,
   options.pose_sd_mm = sensing.surface_pose_sd_mm;
   options.pose_sd_deg = sensing.surface_pose_sd_deg;
   options.stop = stop;
-  auto surface =
-      registration::SurfaceDistances::build(targets.craniotomy, body.surface.vertices, options);
+  auto surface = registration::SurfaceDistances::build(
+      targets.craniotomy, at_most(kMostMeasured, body.surface.vertices), options);
   if (!surface) return tl::unexpected(surface.error());
   RegisteredObservation registered;
   registered.surface = std::move(*surface);

@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // First stage: Observation -> SparseData.
 //
-//   TumourBoundary   ICP to the undeformed tumour surface (paper 2.7), from the tracked pose; then
-//                    a random subset of inversion.sparse_points boundary points (paper 2.6), always
-//                    the same one for the same number of points. scene.rotation = off: translation
-//                    only; on: about every axis, however little the points show of it. By
-//                    sensing.tumour:
+//   TumourBoundary   ICP of at most kMostAligned points, spread at random, to the undeformed tumour
+//                    surface (paper 2.7), from the tracked pose; then a random subset of
+//                    inversion.sparse_points of them (paper 2.6), always the same one for the same
+//                    number of points. scene.rotation = off: translation only; on: about every
+//                    axis, however little the points show of it. By sensing.tumour:
 //                    distances  along the normal of the model's tumour, made anew for every
 //                               estimate (registration/surface_distances.hpp; method condensed).
 //                               The pose is where they start; it tells gross outliers too
@@ -14,8 +14,8 @@
 //                    (method condensed) the means of so many groups of neighbours, with the
 //                    standard deviation of a mean. sensing.landmark_pose_sd_mm and _deg are a
 //                    common error: misregistration of the image during surgery
-//   CorticalSurface  sensing.surface_points of its vertices over the craniotomy, chosen likewise,
-//                    and by sensing.surface:
+//   CorticalSurface  sensing.surface_points of its vertices over the craniotomy (of at most
+//                    kMostMeasured of all), chosen likewise, and by sensing.surface:
 //                    distances  along the normal of the model's cortex, made anew for every
 //                               estimate (registration/surface_distances.hpp; method condensed)
 //                    rigid      ICP to the undeformed cortex under the craniotomy, as for the
@@ -51,6 +51,10 @@ namespace brainshift::pipeline {
 
 // As many as guide an estimate for a surface (registration/surface_distances.hpp).
 inline constexpr int kMostLandmarks = 300;
+// More do not make an alignment better: what neighbouring points are off by alike remains.
+inline constexpr int kMostAligned = 5000;
+// Of a surface, of which a part alone lies over the craniotomy.
+inline constexpr int kMostMeasured = 20000;
 
 struct RegisteredObservation {
   std::string source;

@@ -286,6 +286,36 @@ TEST_F(Sources, ATumourBoundaryIsMeasuredAnewForTheEstimate) {
   EXPECT_EQ(inversion_.seen.common_variance.size(), 0);
 }
 
+TEST_F(Sources, OfVeryManyPointsAPartIsMeasuredAndSaysTheSame) {
+  config_.sensing.boundary_average_mm = 0.0;
+  pipeline_ = pipeline(Method::kCondensed);
+  Observation many = boundary(1, 0);
+  auto& points = std::get<TumourBoundary>(many.body).points;
+  points = geometry::sample_surface(patient()->tumour, 4 * kMostAligned, 5);
+  points.colwise() += Vec3(0, 0, -1);
+  // More gross errors than points that may be looked at.
+  for (Eigen::Index i = 0; i < points.cols(); i += 3) points.col(i) += Vec3(0, 0, 12);
+  const auto update = run(many);
+  ASSERT_TRUE(update);
+  const SparseData data = inversion_.seen;
+  ASSERT_EQ(data.size(), config_.inversion.sparse_points);
+  int off = 0;  // a gross error may come to lie on the tumour
+  for (int i = 0; i < data.size(); ++i) {
+    off += std::abs(data.directions.col(i).dot(data.displacements.col(i)) + data.directions(2, i)) >
+           0.05;
+  }
+  EXPECT_LT(off, data.size() / 10);
+  EXPECT_GT(update->estimate.sources.front().outliers, kMostAligned / 4);
+  EXPECT_LT(update->estimate.sources.front().outliers, kMostAligned / 2);
+
+  Observation wide = cortex(1, 0);
+  auto& vertices = std::get<CorticalSurface>(wide.body).surface.vertices;
+  vertices = vertices.replicate(1, 2 * kMostMeasured / vertices.cols()).eval();
+  ASSERT_TRUE(run(wide));
+  EXPECT_EQ(inversion_.seen.size(),
+            config_.inversion.sparse_points + config_.sensing.surface_points);
+}
+
 // The noise of neighbours is averaged. What the alignment leaves differs among them, so that an
 // average is not exact where the points are.
 TEST_F(Sources, APointOfATumourBoundaryStandsForItsNeighbours) {
