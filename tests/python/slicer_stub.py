@@ -166,6 +166,19 @@ class vtkMRMLGridTransformNode(vtkMRMLTransformableNode):
         return self.log[-1]
 
 
+class vtkMRMLCrosshairNode(Node):
+    """vtkMRMLCrosshairNode.h. `cursor` is None when the mouse is over no view."""
+
+    def __init__(self):
+        super().__init__()
+        self.cursor = None
+
+    def GetCursorPositionRAS(self, place):
+        if self.cursor is not None:
+            place[:] = self.cursor
+        return self.cursor is not None
+
+
 class vtkMRMLColorTableNode(Node):
     def __init__(self):
         super().__init__()
@@ -215,7 +228,8 @@ class vtkMRMLIGTLConnectorNode(Node):
 
 
 CLASSES = {cls.__name__: cls for cls in (vtkMRMLScalarVolumeNode, vtkMRMLVectorVolumeNode, vtkMRMLModelNode, vtkMRMLTextNode,
-                                         vtkMRMLGridTransformNode, vtkMRMLColorTableNode, vtkMRMLIGTLConnectorNode)}
+                                         vtkMRMLGridTransformNode, vtkMRMLColorTableNode, vtkMRMLCrosshairNode,
+                                         vtkMRMLIGTLConnectorNode)}
 
 
 class Scene(Observed):
@@ -256,6 +270,9 @@ class Scene(Observed):
 
     def GetNodeByID(self, node_id):
         return next((node for node in self.nodes if node.GetID() == node_id), None)
+
+    def GetFirstNodeByClass(self, class_name):
+        return next((node for node in self.nodes if node.IsA(class_name)), None)
 
     def GetFirstNode(self, name, class_name):
         return next((node for node in self.nodes if node.GetName() == name and node.IsA(class_name)), None)

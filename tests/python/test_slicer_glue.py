@@ -375,6 +375,39 @@ def test_a_deleted_follower_disturbs_nothing(shown):
     assert not shown.logic.tick().show
 
 
+# ---- under the cursor
+
+def test_the_place_under_the_cursor_says_where_it_was_and_how_sure_that_is(shown):
+    crosshair = shown.scene.AddNewNodeByClass("vtkMRMLCrosshairNode", "Crosshair")
+    assert shown.logic.at_cursor() == "", "over no slice"
+    matrix, dims = ras_grid(8.0)
+    was = np.array([8.0, -16.0, 0.0])  # a node of the grid
+    crosshair.cursor = list(was + smooth(was))
+    moved = np.linalg.norm(smooth(was))
+    assert shown.logic.at_cursor() == f"R 8.0, A -16.0, S 0.0 mm of the MRI moved {moved:.1f} mm", "sd and known came empty"
+
+    def constant(value):
+        def content(node):
+            node.image = image_of(np.full((*reversed(dims), 1), value, np.float32))
+            for row in range(4):
+                for column in range(4):
+                    node.matrix.SetElement(row, column, matrix[row, column])
+        return content
+    shown.receive(SD, constant(0.4), metadata())
+    shown.receive(KNOWN, constant(0.75), metadata())
+    assert shown.logic.at_cursor().endswith(f"moved {moved:.1f} \u00b1 0.4 mm, 75 % known by the data")
+    shown.receive(SD, constant(0.4), metadata(sequence=5))
+    assert "\u00b1" in shown.logic.at_cursor(), "that of the update is on its way"
+    shown.now += 0.6
+    assert "\u00b1" not in shown.logic.at_cursor(), "of another update"
+    crosshair.cursor = [300.0, 0.0, 0.0]
+    assert shown.logic.at_cursor() == "", "outside of the field"
+    crosshair.cursor = list(was)
+    shown.send_state(currency="stale")
+    shown.logic.tick()
+    assert shown.logic.at_cursor() == "", "a field that is taken away says nothing"
+
+
 # ---- sd and surfaces
 
 def test_the_sd_lies_over_the_slices_only_with_the_field(shown):

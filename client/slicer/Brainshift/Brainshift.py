@@ -16,7 +16,7 @@ import vtk
 from BrainshiftLib.colours import FULL_SCALE_MM
 from BrainshiftLib.grid import FieldError, check_field, field_from_image, grid_transform
 from BrainshiftLib.label import LabelError, Light, Verdict, boot_time, may_be_shown, parse_metadata, parse_state
-from BrainshiftLib.scene import FIELD, KNOWN, SD, STATE, TRANSFORM, SceneNodes, bridge_node
+from BrainshiftLib.scene import FIELD, KNOWN, SD, STATE, TRANSFORM, SceneNodes, bridge_node, field_of
 from slicer.ScriptedLoadableModule import (ScriptedLoadableModule, ScriptedLoadableModuleLogic,
                                            ScriptedLoadableModuleTest, ScriptedLoadableModuleWidget)
 from slicer.util import VTKObservationMixin
@@ -66,6 +66,7 @@ class BrainshiftLogic(ScriptedLoadableModuleLogic, VTKObservationMixin):
         self._new_field = False      # arrived and not looked at yet
         self._field = None           # VectorField, checked; None: refused
         self._field_refusal = ""
+        self._label = None           # that came with the field
         self._behind_since = None    # since when field and state have been of different updates
 
     # ---- the bridge
@@ -187,7 +188,14 @@ class BrainshiftLogic(ScriptedLoadableModuleLogic, VTKObservationMixin):
         elif self._connector is not None or self._shown:
             self.nodes.take_away()
         self._shown = self.verdict.show
+        self._label = label
         return self.verdict
+
+    def at_cursor(self):
+        """One line about the place under the mouse cursor, of the field that is shown; else empty."""
+        if not self._shown or self._field is None or self._label is None:
+            return ""
+        return self.nodes.at_cursor(self._field, self._label, self._clock())
 
     def _judge(self):
         """Verdict, and the label of the field."""
@@ -225,11 +233,8 @@ class BrainshiftLogic(ScriptedLoadableModuleLogic, VTKObservationMixin):
         if not self._new_field:
             return
         self._new_field, self._field = False, None
-        matrix = vtk.vtkMatrix4x4()
-        node.GetIJKToRASMatrix(matrix)
-        rows = [[matrix.GetElement(row, column) for column in range(4)] for row in range(4)]
         try:
-            field = field_from_image(node.GetImageData(), rows)
+            field = field_of(node)
             check_field(field)
         except FieldError as error:
             self._field_refusal = str(error)
@@ -298,6 +303,9 @@ class BrainshiftWidget(ScriptedLoadableModuleWidget, VTKObservationMixin):
         self.details = qt.QLabel("")
         self._plain(self.light)
         self._plain(self.details)
+        self.under = qt.QLabel("")
+        self.under.wordWrap = True
+        self._plain(self.under)
         self.followers = slicer.qMRMLCheckableNodeComboBox()
         self.followers.nodeTypes = ["vtkMRMLScalarVolumeNode", "vtkMRMLLabelMapVolumeNode", "vtkMRMLModelNode",
                                     "vtkMRMLSegmentationNode", "vtkMRMLMarkupsNode"]
@@ -307,7 +315,7 @@ class BrainshiftWidget(ScriptedLoadableModuleWidget, VTKObservationMixin):
         self.sd.connect("toggled(bool)", self.on_sd)
         self.known = qt.QCheckBox("What the data know over the slices: dark 1, yellow 0 (a guess)")
         self.known.connect("toggled(bool)", self.on_known)
-        for label, widget in (("", self.light), ("", self.details), ("Moves", self.followers), ("", self.sd),
+        for label, widget in (("", self.light), ("", self.details), ("Under the cursor", self.under), ("Moves", self.followers), ("", self.sd),
                               ("", self.known)):
             form.addRow(label, widget)
 
@@ -359,6 +367,7 @@ class BrainshiftWidget(ScriptedLoadableModuleWidget, VTKObservationMixin):
         self.light.text = f"{words}: {verdict.reason}" if verdict.reason else words
         self.light.setStyleSheet(f"color: white; padding: 6px; background: {self.BACKGROUND[verdict.light]}")
         self.details.text = describe(state, self.logic.nodes.largest_mm)
+        self.under.text = self.logic.at_cursor()
 
 
 def describe(state, largest_mm):

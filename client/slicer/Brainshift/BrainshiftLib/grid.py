@@ -9,7 +9,7 @@ point scalars, x fastest. Outside the grid it repeats the value at the border, s
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any, Callable
+from typing import Any, Callable, Optional
 
 import numpy as np
 import numpy.typing as npt
@@ -31,7 +31,7 @@ class FieldError(ValueError):
 
 @dataclass(frozen=True)
 class VectorField:
-    vectors: npt.NDArray[np.float32]  # (nz, ny, nx, 3), mm, components along R, A, S
+    vectors: npt.NDArray[np.float32]  # (nz, ny, nx, 3), mm, components along R, A, S; (nz, ny, nx, 1) of a scalar volume
     origin: Array   # (3,) RAS of the first voxel's centre
     spacing: Array  # (3,) mm, all positive
 
@@ -45,8 +45,9 @@ class VectorField:
         return not bool(self.vectors.any())
 
 
-def field_from_image(image: Any, ijk_to_ras: npt.ArrayLike) -> VectorField:
-    """A copy of a vector volume (vtkImageData with three components) whose voxels lie at ijk_to_ras (4 x 4).
+def field_from_image(image: Any, ijk_to_ras: npt.ArrayLike, components: int = 3) -> VectorField:
+    """A copy of a vector volume (vtkImageData with three components) whose voxels lie at ijk_to_ras (4 x 4); with
+    components = 1 of a scalar volume.
 
     Axes may be permuted or flipped; the grid is turned so that x, y, z grow along R, A, S. Vectors are RAS as they are.
     Oblique grids are refused: `brainshift bridge` sends none. Origin, spacing and direction of the image itself count
@@ -55,12 +56,12 @@ def field_from_image(image: Any, ijk_to_ras: npt.ArrayLike) -> VectorField:
     scalars = image.GetPointData().GetScalars() if image is not None else None
     if scalars is None:
         raise FieldError("the volume holds no voxels")
-    if scalars.GetNumberOfComponents() != 3:
-        raise FieldError(f"the volume has {scalars.GetNumberOfComponents()} components, not 3")
+    if scalars.GetNumberOfComponents() != components:
+        raise FieldError(f"the volume has {scalars.GetNumberOfComponents()} components, not {components}")
     dims = image.GetDimensions()
     if min(dims) < 3:
         raise FieldError(f"the grid has {dims[0]} x {dims[1]} x {dims[2]} voxels; each must be 3 or more")
-    vectors = numpy_support.vtk_to_numpy(scalars).astype(np.float32).reshape(dims[2], dims[1], dims[0], 3)
+    vectors = numpy_support.vtk_to_numpy(scalars).astype(np.float32).reshape(dims[2], dims[1], dims[0], components)
     return _turned(vectors, np.asarray(ijk_to_ras, dtype=np.float64))
 
 
@@ -98,6 +99,35 @@ def check_field(field: VectorField) -> None:
             raise FieldError("the outermost layer of the field is not zero: it would go on without end outside the grid")
     if field.blank:
         raise FieldError("the field is blank")
+
+
+def value_at(field: VectorField, point: npt.ArrayLike) -> Optional[Array]:
+    """The field at a place (RAS, mm), linear between the voxels' centres. None outside of the grid."""
+    at = (np.asarray(point, dtype=np.float64) - field.origin) / field.spacing
+    low = np.floor(at).astype(int)
+    nz, ny, nx, _ = field.vectors.shape
+    if not np.isfinite(at).all() or (low < 0).any() or (low >= np.array([nx, ny, nz]) - 1).any():
+        return None
+    x, y, z = low
+    corner = field.vectors[z:z + 2, y:y + 2, x:x + 2].astype(np.float64)
+    for part in (at - low)[::-1]:  # z, y, x
+        corner = corner[0] + part * (corner[1] - corner[0])
+    return np.asarray(corner)
+
+
+def undeformed_at(field: VectorField, point: npt.ArrayLike) -> Optional[Array]:
+    """The place x of the MRI with x + u(x) = point, within INVERSE_TOLERANCE_MM, by repetition from point. None outside of
+    the grid, and where it does not settle."""
+    place = np.asarray(point, dtype=np.float64)
+    x = place
+    for _ in range(INVERSE_ITERATIONS):
+        u = value_at(field, x)
+        if u is None:
+            return None
+        before, x = x, place - u
+        if float(np.linalg.norm(x - before)) < INVERSE_TOLERANCE_MM:
+            return x
+    return None
 
 
 def grid_transform(field: VectorField, make: Callable[[], Any] = vtk.vtkGridTransform) -> Any:

@@ -8,9 +8,10 @@ from __future__ import annotations
 from typing import Callable, NamedTuple
 
 import slicer
+import vtk
 
 from .colours import FULL_SCALE_MM, known_colours, sd_colours
-from .grid import grid_transform
+from .grid import FieldError, field_from_image, grid_transform, undeformed_at, value_at
 from .label import LabelError, belongs, parse_metadata
 
 # The devices of `brainshift bridge`; SlicerOpenIGTLink gives their nodes the same names.
@@ -37,6 +38,14 @@ TRANSFORM = "brainshift_transform"
 # A singleton's ID is its class and this tag. Slicer writes a node's reference to the transform into a scene file although
 # the transform itself is not saved. With an ID that no other node takes, the reference can never find another transform.
 SINGLETON = "Brainshift"
+
+
+def field_of(node, components=3):
+    """The VectorField of a volume node. Raises FieldError."""
+    matrix = vtk.vtkMatrix4x4()
+    node.GetIJKToRASMatrix(matrix)
+    rows = [[matrix.GetElement(row, column) for column in range(4)] for row in range(4)]
+    return field_from_image(node.GetImageData(), rows, components)
 
 
 def bridge_node(name):
@@ -87,6 +96,30 @@ class SceneNodes:
         self._show_overlay(name if shown else None)
         for name in SURFACES:
             self._set_surface_visible(name, self._goes_with(name, label, now))
+
+    def at_cursor(self, field, label, now):
+        """What is at the mouse cursor over a slice: where its place in the room was in the MRI, how far it moved, and how
+        sure that is. Empty where the cursor is over no slice, or outside of the field."""
+        crosshair = slicer.mrmlScene.GetFirstNodeByClass("vtkMRMLCrosshairNode")
+        room = [0.0, 0.0, 0.0]
+        if crosshair is None or not crosshair.GetCursorPositionRAS(room):
+            return ""
+        place = undeformed_at(field, room)
+        u = None if place is None else value_at(field, place)
+        if place is None or u is None or not u.any():
+            return ""
+        numbers = {}
+        for name in OVERLAYS:
+            if getattr(label, OVERLAYS[name].has) and self._goes_with(name, label, now):
+                try:
+                    found = value_at(field_of(bridge_node(name), 1), place)
+                except FieldError:
+                    continue
+                if found is not None:
+                    numbers[name] = float(found[0])
+        moved = f"moved {float((u @ u) ** 0.5):.1f}" + (f" \u00b1 {numbers[SD]:.1f}" if SD in numbers else "") + " mm"
+        known = f", {100.0 * numbers[KNOWN]:.0f} % known by the data" if KNOWN in numbers else ""
+        return f"R {place[0]:.1f}, A {place[1]:.1f}, S {place[2]:.1f} mm of the MRI {moved}{known}"
 
     def take_away(self):
         for node_id in self._followers:
