@@ -5,6 +5,7 @@
 # only if every check holds. Needs the program chromium.
 #   CASE=FILE        config/cases/colin27-coarse.yaml by default
 #   MODEL=FILE       prepared of it before
+#   TURNS=0          nothing is timed; GROWTH_S=0: no page stays open for ten minutes (rows-growth.csv)
 set -euo pipefail
 cd "$(dirname "$0")/../.."
 
@@ -17,4 +18,4 @@ name=page
 empty_study "$out"
 export BRAINSHIFT_SOURCE=$PWD BRAINSHIFT_PROGRAMS=$bin PYTHONPATH=$build/python PYTHONDONTWRITEBYTECODE=1
 current=summary
-/usr/bin/python3 tests/python/measure_view.py "${CASE:-config/cases/colin27-coarse.yaml}" "$out" ${MODEL:+--model "$MODEL"}
+/usr/bin/python3 tests/python/measure_view.py "${CASE:-config/cases/colin27-coarse.yaml}" "$out" ${MODEL:+--model "$MODEL"} --turns "${TURNS:-5}" --growth-s "${GROWTH_S:-600}"

@@ -116,6 +116,42 @@ def cursor_errors(browser, model, update):
     return np.array(errors), stated
 
 
+def heap_mb(browser):
+    """What the page's scripts hold, after a collection."""
+    browser.call("HeapProfiler.collectGarbage")
+    used = browser.call("Runtime.getHeapUsage")
+    return (used["usedSize"] + used.get("embedderHeapUsedSize", 0.0) + used.get("backingStorageSize", 0.0)) / 1e6
+
+
+def resident_mb(process):
+    pages = int(pathlib.Path(f"/proc/{process.pid}/statm").read_text().split()[1])
+    return pages * os.sysconf("SC_PAGE_SIZE") / 1e6
+
+
+def grow(options, surgery, endpoint, model_file, folder, record):
+    """A page that stays open, with an update every PERIOD_S: the slope of what page and program hold, times the time. The page keeps
+    300 updates for its strips, so the time until then does not count."""
+    rows = ["s,page_mb,program_mb"]
+    with View(endpoint, "--model", model_file) as view, Chromium(folder / "chromium-growth", view.url) as browser:
+        browser.wait(LIVE)
+        begin, samples = time.monotonic(), []
+        while time.monotonic() - begin < options.growth_s:
+            for _ in range(10):
+                surgery.update()
+            samples.append((time.monotonic() - begin, heap_mb(browser), resident_mb(view.process)))
+            rows.append(",".join(f"{value:.3f}" for value in samples[-1]))
+        assert browser.js("document.body.className") == "", browser.text("verdict")
+        complaints = len(browser.complaints)
+    (options.out / "rows-growth.csv").write_text("\n".join(rows) + "\n")
+    kept = np.array([one for one in samples if one[0] > max(options.growth_s / 3, 1.2 * 300 * PERIOD_S)])
+    for column, name in ((1, "page"), (2, "program")):
+        slope = np.polyfit(kept[:, 0], kept[:, column], 1)[0] if len(kept) > 2 else float("nan")
+        value = slope * options.growth_s
+        record.check(STUDY, f"growth of the {name} in {options.growth_s:.0f} s", value, "<= 2 MB", bool(value <= 2.0))
+    record.figure(STUDY, "updates meanwhile", 10 * len(samples), "")
+    record.check(STUDY, "what the browser complained of", complaints, "= 0", complaints == 0)
+
+
 def percentiles(values):
     return float(np.percentile(values, 50)), float(np.percentile(values, 99))
 
@@ -167,6 +203,10 @@ def measure(options, record):
                         one = first_ms, weight, assets, first_again_ms(browser)
                     if readers:
                         heard.append(int(readers.communicate()[0]))
+        if options.growth_s > 0:
+            grow(options, surgery, daemon.endpoint, model_file, folder, record)
+    if options.turns == 0:
+        return
     (options.out / "rows-updates.csv").write_text("\n".join(rows) + "\n")
     check = lambda name, value, bound, unit: record.check(STUDY, name, value, f"<= {bound} {unit}".strip(), value <= bound)
     p50, p99 = percentiles(drawn[1])
@@ -196,7 +236,8 @@ def main():
     parser.add_argument("case", type=pathlib.Path)
     parser.add_argument("out", type=pathlib.Path)
     parser.add_argument("--model", type=pathlib.Path, help="prepared of the case; otherwise it is prepared")
-    parser.add_argument("--turns", type=int, default=5)
+    parser.add_argument("--turns", type=int, default=5, help="0: nothing is timed")
+    parser.add_argument("--growth-s", type=float, default=600.0, help="how long a page stays open to see what it comes to hold")
     parser.add_argument("--updates", type=int, default=20, help="per turn and number of pages")
     options = parser.parse_args()
     record = Record(options.out)
