@@ -142,6 +142,8 @@ def grow(options, surgery, endpoint, model_file, folder, record):
             rows.append(",".join(f"{value:.3f}" for value in samples[-1]))
         browser.wait(LIVE)
         complaints = len(browser.complaints)
+        for one in browser.complaints:
+            print(f"view: the browser complained: {json.dumps(one)[:400]}", file=sys.stderr)
     (options.out / "rows-growth.csv").write_text("\n".join(rows) + "\n")
     kept = np.array([one for one in samples if one[0] > max(options.growth_s / 3, 1.2 * 300 * PERIOD_S)])
     for column, name in ((1, "page"), (2, "program")):
