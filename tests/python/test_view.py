@@ -234,6 +234,7 @@ def test_a_page_of_a_dead_daemon_goes_grey(browser, surgery, head):
 
 def test_bad_options_are_one_line(head):
     for options, says in ((["--listen", "0.0.0.0:8080"], "for this computer alone"), (["--listen", "8080x"], "--listen"),
-                          (["--model", "/none.h5"], "/none.h5")):
+                          (["--model", "/none.h5"], "/none.h5"), (["--journal", "/tmp"], "--journal needs --model"),
+                          (["--model", head / "model.h5", "--journal", "/none"], "--journal: /none is no folder")):
         done = subprocess.run([PROGRAMS / "brainshift", "view", *options], capture_output=True, text=True, timeout=60)
         assert done.returncode == 2 and says in done.stderr and done.stderr.count("\n") == 1, done.stderr

@@ -315,8 +315,8 @@ class BrainshiftWidget(ScriptedLoadableModuleWidget, VTKObservationMixin):
         self.sd.connect("toggled(bool)", self.on_sd)
         self.known = qt.QCheckBox("What the data know over the slices: dark 1, yellow 0 (a guess)")
         self.known.connect("toggled(bool)", self.on_known)
-        for label, widget in (("", self.light), ("", self.details), ("Under the cursor", self.under), ("Moves", self.followers), ("", self.sd),
-                              ("", self.known)):
+        for label, widget in (("", self.light), ("", self.details), ("Under the cursor", self.under),
+                              ("Moves", self.followers), ("", self.sd), ("", self.known)):
             form.addRow(label, widget)
 
     def cleanup(self):

@@ -195,7 +195,7 @@ async function askForAdvice() {
   asking = true;
   try {
     const answer = await (await get("advice")).json(), of = answer.of ?? "";
-    if (of === (advice?.of ?? "")) return;
+    if (of === (advice?.of ?? "") && answer.reason === advice?.reason) return;
     advice = of ? answer : null;
     tellAdvice();
     draw();

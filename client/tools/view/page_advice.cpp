@@ -45,7 +45,6 @@ PageAdvice::PageAdvice(fs::path model, fs::path journals, std::function<void(std
     : model_(std::move(model)),
       journals_(std::move(journals)),
       told_(std::move(told)),
-      asked_(Clock::now() - kKept),
       thread_([this](const std::stop_token& stop) { run(stop); }) {}
 
 PageAdvice::~PageAdvice() = default;
@@ -77,18 +76,21 @@ void PageAdvice::run(const std::stop_token& stop) {
   std::unique_lock lock(mutex_);
   while (!stop.stop_requested()) {
     const bool wanted = changed_.wait_for(lock, stop, kKept, [&] {
-      return shown_ && shown_->name != answered_ && Clock::now() - asked_ < kAsked;
+      const bool asked = asked_ > tried_ && Clock::now() - asked_ < kAsked;
+      return asked && shown_ && shown_->name != answered_;
     });
     if (!wanted) {
       if (Clock::now() - asked_ > kKept) adviser_.reset();
       continue;
     }
     const ShownField field = *shown_;
+    tried_ = Clock::now();
     lock.unlock();
-    std::string answer = answer_of(field.name, compute(field, stop));
-    if (!stop.stop_requested()) told_(std::move(answer));
+    const auto advised = compute(field, stop);
+    if (!stop.stop_requested()) told_(answer_of(field.name, advised));
     lock.lock();
-    answered_ = field.name;
+    // What the journal did not hold yet may be there at the next question.
+    if (advised || advised.error().code != ErrorCode::kUnavailable) answered_ = field.name;
   }
 }
 

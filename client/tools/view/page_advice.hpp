@@ -62,7 +62,7 @@ class PageAdvice {
   std::condition_variable_any changed_;
   std::optional<ShownField> shown_;
   std::string answered_;  // ShownField::name
-  std::chrono::steady_clock::time_point asked_;
+  std::chrono::steady_clock::time_point asked_, tried_;
   std::jthread thread_;  // last: it uses the others
 };
 

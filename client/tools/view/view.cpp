@@ -325,17 +325,17 @@ class Viewer {
 
 Status view(const ViewOptions& options, const std::function<bool()>& stopped,
             const std::function<void(const std::string&)>& tell) {
-  std::optional<GivenHead> head;
-  if (!options.model.empty()) {
-    auto read = read_head(options.model);
-    if (!read) return tl::unexpected(read.error());
-    head = std::move(*read);
-  }
   if (!options.journal.empty()) {
     if (options.model.empty()) return invalid("--journal needs --model");
     if (std::error_code none; !std::filesystem::is_directory(options.journal, none)) {
       return fail(ErrorCode::kNotFound, "--journal: " + options.journal.string() + " is no folder");
     }
+  }
+  std::optional<GivenHead> head;
+  if (!options.model.empty()) {
+    auto read = read_head(options.model);
+    if (!read) return tl::unexpected(read.error());
+    head = std::move(*read);
   }
   Site site;
   Viewer viewer(options, std::move(head), site, tell);  // before the server, which asks it

@@ -33,7 +33,8 @@ struct ViewOptions {
 // has no model yet.
 // tell: sentences for people; the first names the page's address.
 // Errors: of the address (HttpServer::listen), of reading the model file and its MRI;
-// kInvalidArgument: the first model that the daemon serves is not that of the file.
+// kInvalidArgument: the first model that the daemon serves is not that of the file, or a journal
+// without a model; kNotFound: the journal is no folder.
 Status view(const ViewOptions& options, const std::function<bool()>& stopped,
             const std::function<void(const std::string&)>& tell);
 

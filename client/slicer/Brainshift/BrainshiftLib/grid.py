@@ -115,21 +115,6 @@ def value_at(field: VectorField, point: npt.ArrayLike) -> Optional[Array]:
     return np.asarray(corner)
 
 
-def undeformed_at(field: VectorField, point: npt.ArrayLike) -> Optional[Array]:
-    """The place x of the MRI with x + u(x) = point, within INVERSE_TOLERANCE_MM, by repetition from point. None outside of
-    the grid, and where it does not settle."""
-    place = np.asarray(point, dtype=np.float64)
-    x = place
-    for _ in range(INVERSE_ITERATIONS):
-        u = value_at(field, x)
-        if u is None:
-            return None
-        before, x = x, place - u
-        if float(np.linalg.norm(x - before)) < INVERSE_TOLERANCE_MM:
-            return x
-    return None
-
-
 def grid_transform(field: VectorField, make: Callable[[], Any] = vtk.vtkGridTransform) -> Any:
     """T of a checked field. make: vtk.vtkGridTransform, or slicer.vtkOrientedGridTransform. The transform keeps a copy."""
     check_field(field)

@@ -11,7 +11,7 @@ import slicer
 import vtk
 
 from .colours import FULL_SCALE_MM, known_colours, sd_colours
-from .grid import FieldError, field_from_image, grid_transform, undeformed_at, value_at
+from .grid import FieldError, field_from_image, grid_transform, value_at
 from .label import LabelError, belongs, parse_metadata
 
 # The devices of `brainshift bridge`; SlicerOpenIGTLink gives their nodes the same names.
@@ -104,9 +104,9 @@ class SceneNodes:
         room = [0.0, 0.0, 0.0]
         if crosshair is None or not crosshair.GetCursorPositionRAS(room):
             return ""
-        place = undeformed_at(field, room)
-        u = None if place is None else value_at(field, place)
-        if place is None or u is None or not u.any():
+        place = self._transform_node().GetTransformToParent().GetInverse().TransformPoint(room)
+        u = value_at(field, place)
+        if u is None or not u.any():
             return ""
         numbers = {}
         for name in OVERLAYS:
