@@ -238,9 +238,6 @@ std::vector<std::string> report_lines(const RegisterReport& report) {
         "held still {}: {:.1f} to {:.1f} s, {} poses averaged, spread {:.2f} mm rms{}", i + 1,
         held.from_s, held.to_s, held.poses, held.spread_mm, chosen ? "" : ", not used"));
   }
-  for (const std::string& name : report.left_out) {
-    lines.push_back("note: only one list has the fiducial \"" + name + "\"");
-  }
   std::string residuals;
   for (std::size_t i = 0; i < report.residuals_mm.size(); ++i) {
     const bool named = i < report.names.size() && !report.names[i].empty();
@@ -249,7 +246,11 @@ std::vector<std::string> report_lines(const RegisterReport& report) {
                     named ? report.names[i] : std::to_string(i + 1), report.residuals_mm[i]);
   }
   lines.push_back("residuals, mm: " + residuals);
-  const auto told = fiducial_lines(report.fiducials, report.names, report.target);
+  auto told = fiducial_lines(report.fiducials, report.names, report.target);
+  if (!report.left_out.empty()) {
+    told.front() += fmt::format("; left out, since only one list has it: \"{}\"",
+                                fmt::join(report.left_out, "\", \""));
+  }
   lines.insert(lines.end(), told.begin(), told.end());
   return lines;
 }
