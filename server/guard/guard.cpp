@@ -139,9 +139,11 @@ struct Guard::Impl {
 
   void open(int peer) {
     std::unique_ptr<Connection> connection;
+    const auto now = Clock::now();
     try {
       connection = std::make_unique<Connection>(
-          ZmtpStream::Bounds{.message_bytes = options.max_message_bytes + kWrapping}, Clock::now());
+          ZmtpStream::Bounds{.message_bytes = options.max_message_bytes + kWrapping},
+          Allowance(options.bytes_per_s, options.burst_bytes, now), now);
     } catch (...) {
       ::close(peer);
       throw;
@@ -194,8 +196,10 @@ struct Guard::Impl {
       bool more = true;
       if (up) {
         connection.account->throttled = true;  // first: delivered() sees it, or has been seen
-        held += connection.settle(Clock::now());
+        const auto now = Clock::now();
+        held += connection.settle(now);
         more =
+            connection.allowance.left(now) &&
             connection.held <= options.max_message_bytes + kSlack &&
             connection.waiting <= (connection.stream.encrypted() ? kMaxWaitingParts : kMaxWaiting);
         connection.account->throttled = !more;
@@ -212,6 +216,7 @@ struct Guard::Impl {
       if (got == 0) return gone();
       lane.begin = 0;
       lane.end = static_cast<std::size_t>(got);
+      if (up) connection.allowance.spend(lane.end);
       if (up && !within_bounds(connection)) return false;
     }
     return true;

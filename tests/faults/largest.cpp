@@ -51,15 +51,27 @@ TriangleSurface refined(TriangleSurface surface) {
   return surface;
 }
 
-// Points between those of a cloud, as many as an observation may have.
-Points filled(const Points& cloud, int count, std::mt19937& random) {
+// Points between those of a cloud, as many as an observation may have; `which`: beside which each
+// lies.
+Points filled(const Points& cloud, int count, std::mt19937& random,
+              std::vector<int>* which = nullptr) {
   Points points(3, count);
   for (int i = 0; i < count; ++i) {
-    points.col(i) = cloud.col(static_cast<Eigen::Index>(random() % cloud.cols()));
+    const auto beside = static_cast<Eigen::Index>(random() % cloud.cols());
+    if (which != nullptr) which->push_back(static_cast<int>(beside));
+    points.col(i) = cloud.col(beside);
     for (int axis = 0; axis < 3; ++axis)
       points(axis, i) += 1e-3 * static_cast<double>(random() % 1000) - 0.5;
   }
   return points;
+}
+
+// Pairs between those of a recording, each moved as the one that it lies beside.
+LandmarkPairs filled(const LandmarkPairs& pairs, int count, std::mt19937& random) {
+  std::vector<int> beside;
+  const Points undeformed = filled(pairs.undeformed, count, random, &beside);
+  const Points moved = pairs.deformed - pairs.undeformed;
+  return {undeformed, undeformed + moved(Eigen::all, beside), pairs.sd_mm};
 }
 
 // The largest of each body, every one of a source of its own. Points are those of the recording and
@@ -82,12 +94,12 @@ std::vector<Observation> largest(const Feed& feed, const BrainModel& model, std:
     } else if (const auto* cortex = std::get_if<CorticalSurface>(&seen.body)) {
       const Points points = filled(cortex->surface.vertices, server::kMaxObservedPoints, random);
       add("large-surface", CorticalSurface{{points, {}}, cortex->sd_mm});
+    } else if (const auto* pairs = std::get_if<LandmarkPairs>(&seen.body)) {
+      add("large-landmarks", filled(*pairs, server::kMaxLandmarkPairs, random));
     }
   }
   add("large-triangles",
       CorticalSurface{refined({model.mesh.nodes, model.boundary_triangles}), 1.0});
-  const Points pairs = filled(model.mesh.nodes, server::kMaxLandmarkPairs, random);
-  add("large-landmarks", LandmarkPairs{pairs, pairs, 1.0});
   return made;
 }
 
