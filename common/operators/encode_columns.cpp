@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "common/operators/encode_columns.hpp"
 
+#include <malloc.h>
+
 #include <algorithm>
 #include <atomic>
 #include <cassert>
@@ -246,8 +248,11 @@ class Encoder {
   const Eigen::VectorXf& steps_;
 };
 
-// Frees every array as it is taken over.
+// Frees every array as it is taken over, and hands the memory back as it goes: of a fine mesh they
+// are half of what there is.
 void join(std::vector<Block>& blocks, CompactParts& parts) {
+  constexpr std::size_t kHandBack = 256u << 20;
+  std::size_t freed = 0;
   const auto take = [&](auto& list, auto member) {
     Index size = 0;
     for (const Block& block : blocks) size += static_cast<Index>((block.*member).size());
@@ -257,6 +262,11 @@ void join(std::vector<Block>& blocks, CompactParts& parts) {
       const auto own = std::exchange(block.*member, {});
       std::copy(own.begin(), own.end(), list.data() + at);
       at += static_cast<Index>(own.size());
+      freed += own.size() * sizeof own[0];
+      if (freed > kHandBack) {
+        ::malloc_trim(0);
+        freed = 0;
+      }
     }
   };
   for (std::size_t b = 0; b < blocks.size(); ++b) {

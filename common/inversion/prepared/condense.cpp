@@ -23,7 +23,7 @@ namespace {
 using Eigen::MatrixXd;
 using Eigen::MatrixXf;
 
-constexpr int kBlock = BlockRunner::kBlock;
+constexpr int kLeastBlock = 24;
 // Test vectors beyond the modes that are kept. Far more than the 5 to 10 that Halko et al.
 // recommend, because the spectrum falls slowly: 32 left 0.013 mm in a swollen brain with 659 active
 // slaves, about 200 left 0.008 mm.
@@ -168,10 +168,12 @@ void append_modes(const MatrixXd& fields, MatrixXf& modes, CondensedOperators& r
   }
 }
 
+constexpr double kGib = 1024.0 * 1024.0 * 1024.0;
+
 // Before anything is allocated.
 Status check_memory(const PreparedModel& model, std::uint64_t bytes) {
   const double limit_gib = model.config().condensed.memory_limit_gib;
-  const double needed_gib = static_cast<double>(bytes) / (1024.0 * 1024.0 * 1024.0);
+  const double needed_gib = static_cast<double>(bytes) / kGib;
   if (needed_gib <= limit_gib) return {};
   return invalid(fmt::format(
       "condensed.memory_limit_gib = {:.3g}: the preparation needs {:.3g} GiB ({} slaves, "
@@ -180,9 +182,10 @@ Status check_memory(const PreparedModel& model, std::uint64_t bytes) {
       model.model().mesh.num_nodes()));
 }
 
-// Steps 1 and 2: U.
-Status prior_modes(const PreparedModel& model, BlockRunner& runner, MatrixXf& modes,
-                   CondensedOperators& result) {
+// Steps 1 and 2: U. one_field_at_a_time: of the near fields' sketches only one is there at a time,
+// and their test vectors are solved once for each.
+Status prior_modes(const PreparedModel& model, BlockRunner& runner, bool one_field_at_a_time,
+                   MatrixXf& modes, CondensedOperators& result) {
   const Eigen::Index rows = 3 * model.model().mesh.num_nodes();
   const prior::ForcePrior& prior = model.prior();
   const int loads = prior.num_modes();
@@ -212,11 +215,6 @@ Status prior_modes(const PreparedModel& model, BlockRunner& runner, MatrixXf& mo
       geometry::spread_nodes(model.model().mesh.nodes, model.config().condensed.uncertainty_nodes);
   const TestVectors omega_far = test_vectors(result, everywhere, tested_far);
   std::array<MatrixXd, kRemainders> sketches;
-  for (std::size_t g = 0; g < kept.size(); ++g) {
-    if (kept[g] > 0) {
-      sketches[g].resize(runner.own_count(g == kFarField ? tested_far : tested), rows);
-    }
-  }
   const auto sketch = [&](std::size_t g, int first, int count, auto& own) -> Status {
     own.loads.resize(count, rows);
     if (count > 0) prior.kernel(static_cast<int>(g)).apply(own.solved, own.loads);
@@ -225,34 +223,41 @@ Status prior_modes(const PreparedModel& model, BlockRunner& runner, MatrixXf& mo
     sketches[g].middleRows(first - before, count) = own.loads;
     return {};
   };
-  status = runner.run("prior modes", tested, [&](int first, int count, auto& own) -> Status {
-    omega.write(first, count, rows, own.loads);
-    if (auto solved = own.solver.solve(own.loads, own.solved); !solved) return solved;
-    for (std::size_t g = 0; g < kFarField; ++g) {
-      if (kept[g] == 0) continue;
-      if (auto sketched = sketch(g, first, count, own); !sketched) return sketched;
+  // The modes of some fields that share their test vectors.
+  const auto modes_of = [&](std::string_view stage, const TestVectors& vectors,
+                            std::span<const std::size_t> fields) -> Status {
+    const auto count_of = static_cast<int>(vectors.numbers.rows());
+    for (const std::size_t g : fields) sketches[g].resize(runner.own_count(count_of), rows);
+    auto ran = runner.run(stage, count_of, [&](int first, int count, auto& own) -> Status {
+      vectors.write(first, count, rows, own.loads);
+      if (auto solved = own.solver.solve(own.loads, own.solved); !solved) return solved;
+      for (const std::size_t g : fields) {
+        if (auto sketched = sketch(g, first, count, own); !sketched) return sketched;
+      }
+      return {};
+    });
+    if (!ran) return ran;
+    for (const std::size_t g : fields) {
+      const auto leading = leading_modes(vectors, sketches[g], kept[g], runner);
+      if (!leading) return tl::unexpected(leading.error());
+      sketches[g].resize(0, 0);
+      result.part_columns[kLoadParts + g] = static_cast<int>(leading->rows());
+      append_modes(*leading, modes, result);
     }
     return {};
-  });
-  if (!status) return status;
-  if (tested_far > 0)
-    status = runner.run("far modes", tested_far, [&](int first, int count, auto& own) -> Status {
-      omega_far.write(first, count, rows, own.loads);
-      if (auto solved = own.solver.solve(own.loads, own.solved); !solved) return solved;
-      return sketch(kFarField, first, count, own);
-    });
-  if (!status) return status;
+  };
   result.part_columns = prior.columns_of_part();
-  for (std::size_t g = 0; g < kept.size(); ++g) {
-    if (kept[g] == 0) continue;
-    const auto leading =
-        leading_modes(g == kFarField ? omega_far : omega, sketches[g], kept[g], runner);
-    if (!leading) return tl::unexpected(leading.error());
-    sketches[g].resize(0, 0);
-    result.part_columns[kLoadParts + g] = static_cast<int>(leading->rows());
-    append_modes(*leading, modes, result);
+  std::vector<std::size_t> near;
+  for (std::size_t g = 0; g < kFarField; ++g) {
+    if (kept[g] > 0) near.push_back(g);
   }
-  return {};
+  const std::size_t together = one_field_at_a_time ? 1 : near.size();
+  for (std::size_t first = 0; status && first < near.size(); first += together) {
+    status = modes_of("prior modes", omega, std::span(near).subspan(first, together));
+  }
+  constexpr std::array far = {kFarField};
+  if (status && kept[kFarField] > 0) status = modes_of("far modes", omega_far, far);
+  return status;
 }
 
 // Neighbours are solved together (contact_columns.hpp says why).
@@ -396,14 +401,17 @@ Result<Solved> solve(const PreparedModel& model, const CondenseOptions& options,
   sizes.ranks = model.ranks() != nullptr ? model.ranks()->size() : 1;
   sizes.model_stays = !free_model;
   sizes.columns_in_memory = !options.store.keeps();
-  BlockRunner runner(model, options.progress, options.stop, options.threads);
+  const auto limit = static_cast<std::uint64_t>(model.config().condensed.memory_limit_gib * kGib);
+  sizes = within_memory(sizes, limit);
+  BlockRunner runner(model, options.progress, options.stop, options.threads, sizes.block);
   if (auto ok = runner.agree(check_memory(model, condense_memory_bytes(sizes))); !ok) {
     return tl::unexpected(ok.error());
   }
   solved.nodes = node_blocks(model.model().mesh.nodes);
   add_slaves(model, result);
   // The modes first: the test vectors are gone before the first column is there.
-  if (auto status = prior_modes(model, runner, solved.modes, result); !status) {
+  if (auto status = prior_modes(model, runner, sizes.one_field_at_a_time, solved.modes, result);
+      !status) {
     return tl::unexpected(status.error());
   }
   if (auto status = check_motion(solved.modes); !status) return tl::unexpected(status.error());
@@ -447,17 +455,26 @@ std::uint64_t condense_memory_bytes(const CondenseSizes& sizes) {
   const std::uint64_t ranks = of(sizes.ranks);
   const std::uint64_t columns = sizes.columns_in_memory ? 4 * rows * s / ranks : 0;
   // Two matrices of a member, three of its solver.
-  const std::uint64_t blocks = 5 * 8 * rows * kBlock * of(sizes.threads);
+  const std::uint64_t blocks = 5 * 8 * rows * of(sizes.block) * of(sizes.threads);
   const std::uint64_t modes = 4 * rows * m, compliance = 8 * s * s;
   // Three residual fields, as the default case has them; the fourth is rare.
-  const std::uint64_t sketches = 8 * tested * (3 * rows / ranks + 3 * (of(sizes.region) + s));
+  const std::uint64_t fields = sizes.one_field_at_a_time ? 1 : 3;
+  const std::uint64_t sketches = 8 * tested * (fields * rows / ranks + 3 * (of(sizes.region) + s));
   const std::uint64_t solving =
       sizes.model_bytes + modes + blocks + std::max(sketches, compliance + columns);
-  // Compact columns take less than half of single precision, and are there twice when joined.
-  const std::uint64_t compact = 2 * rows * (s + m), region = 4 * 3 * of(sizes.region) * (s + m);
+  // Compact columns take 1.5 bytes a number in coarse meshes and less in fine ones, also while they
+  // are joined: every part is freed once it is copied.
+  const std::uint64_t compact = 3 * rows * (s + m) / 2, region = 4 * 3 * of(sizes.region) * (s + m);
   const std::uint64_t packing =
       (sizes.model_stays ? sizes.model_bytes : 0) + modes + compliance + columns + compact + region;
   return std::max(solving, packing);
+}
+
+CondenseSizes within_memory(CondenseSizes sizes, std::uint64_t limit_bytes) {
+  if (sizes.ranks > 1 || condense_memory_bytes(sizes) <= limit_bytes) return sizes;
+  sizes.one_field_at_a_time = true;
+  while (condense_memory_bytes(sizes) > limit_bytes && sizes.block > kLeastBlock) sizes.block /= 2;
+  return sizes;
 }
 
 double largest_motion_sd_mm(const CondensedOperators& operators) {

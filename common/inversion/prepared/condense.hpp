@@ -41,8 +41,8 @@ struct CondenseOptions {
   int threads = 0;       // 0: as many as cores
 };
 
-// kInvalidArgument when condensed.memory_limit_gib is below condense_memory_bytes (the sentence
-// names both), and when the case's prior allows no motion at all or ten times as much as a skull
+// Within condensed.memory_limit_gib (within_memory). kInvalidArgument when that is too little all
+// the same (the sentence names both), and when the case's prior allows no motion at all or ten times as much as a skull
 // does (the sentence has the figure); kUnavailable when stopped; kNotFinite; errors of the store.
 Result<CondensedOperators> condense(const PreparedModel& model,
                                     const CondenseOptions& options = {});
@@ -54,9 +54,14 @@ struct CondenseSizes {
   std::uint64_t model_bytes = 0;  // PrepareTimings::bytes
   bool model_stays = true;        // during step 5
   bool columns_in_memory = true;
+  int block = BlockRunner::kBlock;   // columns that a thread solves together
+  bool one_field_at_a_time = false;  // the residual fields' modes: half as many solves more
 };
 // Peak memory of condense() and of its model, bytes; of the first process where there are several.
 std::uint64_t condense_memory_bytes(const CondenseSizes& sizes);
+// With as much saved as `limit_bytes` needs: first the residual fields one after the other, which
+// changes no number, then smaller blocks, down to 24 columns. By several processes nothing.
+CondenseSizes within_memory(CondenseSizes sizes, std::uint64_t limit_bytes);
 
 // The largest standard deviation of a node's motion under the prior, mm: root of the sum over its
 // components.

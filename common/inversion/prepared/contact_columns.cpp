@@ -143,7 +143,7 @@ Result<ContactColumns> solve_contact_columns(const PreparedModel& model, const S
   const auto s = static_cast<Eigen::Index>(result.slaves.size());
   const Eigen::Index rows = 3 * model.model().mesh.num_nodes();
   ContactColumns columns;
-  columns.block_size = BlockRunner::block_size(static_cast<int>(s), runner.ranks());
+  columns.block_size = runner.size_for(static_cast<int>(s));
   columns.order = spatial_blocks(slave_positions(model, result), columns.block_size).order;
   const int size = columns.block_size, blocks = (static_cast<int>(s) + size - 1) / size;
   columns.store = store.keeps() ? std::move(store) : memory_store(blocks);

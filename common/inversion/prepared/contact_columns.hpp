@@ -39,9 +39,10 @@ class BlockRunner {
   // Columns of each block but the last, which may have fewer. An even number of blocks of the same
   // size, so that two or four cores end at the same time; whatever their number is, since a block's
   // numbers depend on its size in their last bits.
-  static int block_size(int columns, const Ranks* ranks = nullptr) {
+  // block: at most; of several processes kSharedBlock instead.
+  static int block_size(int columns, const Ranks* ranks = nullptr, int block = kBlock) {
     const int together = ranks == nullptr ? 2 : ranks->size();
-    const int most = together * (ranks == nullptr ? kBlock : kSharedBlock);
+    const int most = together * (ranks == nullptr ? block : kSharedBlock);
     const int rounds = std::max(1, (columns + most - 1) / most);
     return std::max(1, (columns + together * rounds - 1) / (together * rounds));
   }
@@ -61,9 +62,12 @@ class BlockRunner {
     Eigen::MatrixXd loads, solved, forces;
   };
 
-  // Keeps a reference to the model. threads: 0 means as many as cores.
-  BlockRunner(const PreparedModel& model, Progress progress, std::stop_token stop, int threads)
-      : ranks_(model.ranks()),
+  // Keeps a reference to the model. threads: 0 means as many as cores. block: columns of a block at
+  // most.
+  BlockRunner(const PreparedModel& model, Progress progress, std::stop_token stop, int threads,
+              int block = kBlock)
+      : block_(block),
+        ranks_(model.ranks()),
         team_(ranks_ != nullptr ? 1 : threads),
         progress_(std::move(progress)),
         stop_(std::move(stop)) {
@@ -80,7 +84,7 @@ class BlockRunner {
   template <typename Work>
   Status run(std::string_view stage, int columns, const Work& work) {
     if (ranks_ != nullptr) return run_together(stage, columns, work);
-    const int size = block_size(columns), blocks = (columns + size - 1) / size;
+    const int size = size_for(columns), blocks = (columns + size - 1) / size;
     std::atomic<int> done{0};
     std::atomic<bool> failed{false};
     std::vector<Status> statuses(static_cast<std::size_t>(team_.size()));
@@ -109,6 +113,8 @@ class BlockRunner {
     return {};
   }
 
+  // Columns of a block of `run`.
+  int size_for(int columns) const { return block_size(columns, ranks_, block_); }
   Ranks* ranks() const { return ranks_; }
   // Sums over the processes, in place.
   template <typename Matrix>
@@ -123,16 +129,16 @@ class BlockRunner {
  private:
   int rank() const { return ranks_ != nullptr ? ranks_->rank() : 0; }
   int rounds(int columns) const {
-    const int each = block_size(columns, ranks_) * ranks_->size();
+    const int each = size_for(columns) * ranks_->size();
     return (columns + each - 1) / each;
   }
   // The first column of process r.
   int part(int columns, int r) const {
-    return ranks_ == nullptr ? r * columns : r * rounds(columns) * block_size(columns, ranks_);
+    return ranks_ == nullptr ? r * columns : r * rounds(columns) * size_for(columns);
   }
   template <typename Work>
   Status run_together(std::string_view stage, int columns, const Work& work) {
-    const int size = block_size(columns, ranks_), all = rounds(columns);
+    const int size = size_for(columns), all = rounds(columns);
     const int first = own_first(columns), end = first + own_count(columns);
     report(progress_, stage, 0.0);
     for (int round = 0; round < all; ++round) {
@@ -147,6 +153,7 @@ class BlockRunner {
     return {};
   }
 
+  int block_;
   Ranks* ranks_;
   ThreadTeam team_;
   Progress progress_;
@@ -170,7 +177,7 @@ struct BlockStore {
 };
 struct ContactColumns {
   std::vector<int> order;        // of the slaves, block after block
-  int block_size = 1;            // BlockRunner::block_size()
+  int block_size = 1;            // BlockRunner::size_for()
   Eigen::Index first_place = 0;  // the store's rows begin with this node of node_blocks()
   BlockStore store;
   float greatest = 0.0F;

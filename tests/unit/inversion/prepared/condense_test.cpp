@@ -184,6 +184,38 @@ TEST_F(Condensed, FewerThreadsGiveTheSameBits) {
   EXPECT_TRUE(serial.truncated_variance_mm2 == parallel.truncated_variance_mm2);
 }
 
+// What the preparation of `model` needs with one thread and everything at hand, bytes.
+std::uint64_t ample_bytes(const PreparedModel& model) {
+  CondenseSizes sizes;
+  sizes.nodes = model.model().mesh.num_nodes();
+  sizes.slaves = model.forward().contact().num_slaves();
+  sizes.region = static_cast<int>(data_region(model.model()).size());
+  sizes.modes = model.config().condensed.max_rank;
+  sizes.model_bytes = model.timings().bytes;
+  return condense_memory_bytes(sizes);
+}
+
+TEST_F(Condensed, WithLittleMemoryItTakesLongerAndGivesTheSame) {
+  CondenseOptions one;
+  one.threads = 1;
+  const auto ample = value_or_fail(condense(prepared(Boundary::kContact), one));
+  const auto with_limit = [&](double share) {
+    CaseConfig little = config();
+    little.condensed.memory_limit_gib =
+        share * static_cast<double>(ample_bytes(prepared(Boundary::kContact))) / (1 << 30);
+    const auto model = value_or_fail(PreparedModel::prepare(patient(), little, Boundary::kContact));
+    std::size_t reports = 0;
+    one.progress = [&](std::string_view, double) { ++reports; };
+    return std::pair(value_or_fail(condense(model, one)), reports);
+  };
+  const auto [same, reports] = with_limit(0.999);
+  EXPECT_TRUE(same.responses.parts() == ample.responses.parts()) << "one field after the other";
+  EXPECT_TRUE(same.compliance == ample.compliance);
+  const auto [close, more_reports] = with_limit(0.6);
+  EXPECT_GT(more_reports, reports) << "smaller blocks";
+  EXPECT_LT((close.compliance - ample.compliance).norm(), 1e-12 * ample.compliance.norm());
+}
+
 // A store in memory that also remembers compliances, as a checkpoint does.
 struct RememberingStore {
   std::map<int, std::pair<Eigen::MatrixXf, Eigen::MatrixXd>> kept;
@@ -267,6 +299,25 @@ TEST(CondenseMemory, OfAHundredThousandNodesIsWithinTheDefaultWithColumnsOnDisk)
   EXPECT_GT(gib(), 12.0);
   sizes.model_stays = sizes.columns_in_memory = false;
   EXPECT_LT(gib(), CaseConfig{}.condensed.memory_limit_gib);
+}
+
+TEST(CondenseMemory, OfAQuarterMillionNodesFitsIntoTwentyGibBySavingNoMoreThanItMust) {
+  CondenseSizes sizes;
+  sizes.nodes = 242402;
+  sizes.slaves = 13400;
+  sizes.region = 3000;
+  sizes.modes = 189;
+  sizes.threads = 2;
+  sizes.model_bytes = 15355000000;
+  sizes.model_stays = sizes.columns_in_memory = false;
+  const std::uint64_t limit = std::uint64_t{20} << 30;
+  EXPECT_GT(condense_memory_bytes(sizes), limit);
+  const CondenseSizes saving = within_memory(sizes, limit);
+  EXPECT_LE(condense_memory_bytes(saving), limit);
+  EXPECT_EQ(saving.block, BlockRunner::kBlock / 2);
+  EXPECT_TRUE(saving.one_field_at_a_time);
+  EXPECT_EQ(within_memory(sizes, 2 * limit).block, BlockRunner::kBlock);
+  EXPECT_FALSE(within_memory(sizes, 2 * limit).one_field_at_a_time);
 }
 
 TEST_F(Condensed, MemoryLimitIsRespectedBeforeWorkBegins) {
