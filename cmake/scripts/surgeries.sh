@@ -11,6 +11,7 @@
 #   KINDS=a,b        these kinds of truths from outside, and no scenario (docs/surgeries.md)
 #   FIXED=1          estimate truths from outside with prior.scales: fixed too, in OUT_DIR-fixed, and hold the
 #                    default's interval score against it
+#   THOUSAND_NODES=N meshes of about so many thousand nodes (default: those of the case files, 18)
 #   QUICK=1          2 places x 2 seeds, from 1001 and 1101, on 6 thousand nodes
 set -euo pipefail
 cd "$(dirname "$0")/../.."
@@ -28,6 +29,7 @@ if [ "${QUICK:-0}" = 1 ]; then
   options+=(--places 2 --seeds 2 --thousand-nodes 6)
   first=1001
 fi
+if [ -n "${THOUSAND_NODES:-}" ]; then options+=(--thousand-nodes "$THOUSAND_NODES"); fi
 if [ -n "${KINDS:-}" ]; then
   options+=(--kinds "$KINDS")
 fi
