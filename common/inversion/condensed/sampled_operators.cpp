@@ -9,6 +9,7 @@
 #include <sstream>
 
 #include "common/inversion/contract/data_check.hpp"
+#include "common/linalg/column_sums.hpp"
 #include "common/linalg/growing_matrix.hpp"
 #include "common/operators/encode_columns.hpp"
 
@@ -46,6 +47,7 @@ void SampledOperators::reserve(int data) {
   linalg::replace(row_weights_, 3 * data);
   linalg::replace(forced_, 3 * data);
   missing_.reserve(slaves);
+  columns_.reserve(slaves);
   contact_columns_ = std::move(columns);
   whitened_contact_ = std::move(whitened);
   capacity_ = data;  // all of it is there
@@ -227,10 +229,9 @@ void SampledOperators::subtract_contact(const std::vector<int>& active,
   sample_contact(active);
   auto sum = forced_.head(rows());
   sum.setZero();
-  for (std::size_t j = 0; j < active.size(); ++j) {
-    linalg::blas::add_scaled(rows(), forces[static_cast<Eigen::Index>(j)],
-                             contact_column(active[j]), sum.data());
-  }
+  columns_.clear();
+  for (const int slave : active) columns_.push_back(contact_column(slave));
+  linalg::add_columns(columns_.data(), forces.data(), columns_.size(), 0, rows(), sum.data());
   out.array() -= row_weights_.head(rows()).array() * sum.array();
 }
 

@@ -108,6 +108,7 @@ class SampledOperators {
   std::unique_ptr<double[]> contact_columns_, whitened_contact_;
   std::vector<char> has_column_;  // by slave
   std::vector<int> missing_;
+  std::vector<const double*> columns_;  // of subtract_contact()
 };
 
 }  // namespace brainshift::inversion

@@ -145,7 +145,7 @@ double ContactReach::along(const VecX& step, const VecX& penetration, int most) 
     closing_.segment(begin, end - begin).noalias() = -modes.middleRows(begin, end - begin) * step;
   });
   if (2 * k <= operators_.num_slaves()) {
-    subtract_penetration(operators_, active, opening, team_, closing_);
+    reduction_.compliance().subtract(active, opening, closing_);
   } else {  // of few open slaves each is the product of one column, because Phi is symmetric
     crossings_.setZero();
     for (int j = 0; j < k; ++j) crossings_[active[static_cast<std::size_t>(j)]] = opening[j];

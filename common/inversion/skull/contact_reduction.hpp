@@ -62,6 +62,9 @@ class ContactReduction {
   // f0 - T z, of the active slaves, N; those that pull are no solution. out: k.
   void forces_at(const VecX& z, Eigen::Ref<VecX> out) const;
 
+  // The compliance that the system sums up depths with.
+  SlaveCompliance& compliance() const { return system_.compliance(); }
+
   // D^-1 N_A^T U of the modes before the window (those a scene leaves out), k x window.first.
   // Allocates. Errors of ContactSystem::take.
   Result<Eigen::MatrixXd> response_before() const;
@@ -99,7 +102,8 @@ class ContactReduction {
 //
 // with T of ContactReduction. A step that ends where few slaves have changed finds contact
 // with few sets and few updates of its factor; one that goes far beyond costs ten factorisations,
-// and its end says nothing of the way. Nothing is allocated after construction.
+// and its end says nothing of the way. Depths are sums in single precision (slave_compliance.hpp).
+// Nothing is allocated after construction.
 class ContactReach {
  public:
   // Keeps references to all but the numbers. beta: penalty, N/mm. contact: false keeps every slave
