@@ -231,7 +231,10 @@ void SampledOperators::subtract_contact(const std::vector<int>& active,
   sum.setZero();
   columns_.clear();
   for (const int slave : active) columns_.push_back(contact_column(slave));
-  linalg::add_columns(columns_.data(), forces.data(), columns_.size(), 0, rows(), sum.data());
+  team_.split(rows(), [&](long begin, long end) {
+    linalg::add_columns(columns_.data(), forces.data(), columns_.size(), begin, end - begin,
+                        sum.data() + begin);
+  });
   out.array() -= row_weights_.head(rows()).array() * sum.array();
 }
 
@@ -240,10 +243,12 @@ void SampledOperators::contact_transposed(const std::vector<int>& active, const 
   sample_contact(active);
   auto weighted = forced_.head(rows());
   weighted = row_weights_.head(rows()).cwiseProduct(v);
-  for (std::size_t j = 0; j < active.size(); ++j) {
-    out[static_cast<Eigen::Index>(j)] =
-        Eigen::Map<const VecX>(contact_column(active[j]), rows()).dot(weighted);
-  }
+  team_.split(static_cast<long>(active.size()), [&](long begin, long end) {
+    for (long j = begin; j < end; ++j) {
+      out[j] = Eigen::Map<const VecX>(contact_column(active[static_cast<std::size_t>(j)]), rows())
+                   .dot(weighted);
+    }
+  });
 }
 
 }  // namespace brainshift::inversion
