@@ -9,6 +9,8 @@ namespace {
 
 namespace blas = linalg::blas;
 
+using Blocks = StrengthEvidence::Blocks;
+
 constexpr int kMaxSteps = 60;
 // Of ln p, which is known to about 1e-7.
 constexpr double kMinGain = 1e-6;
@@ -16,6 +18,8 @@ constexpr double kMinGain = 1e-6;
 // are kept.
 constexpr double kMinWeight = 0.01;
 constexpr std::size_t kMaxHypotheses = 20;
+// Columns of a triangular matrix that are computed at once.
+constexpr Eigen::Index kTogether = 24;
 // Makes the covariance of absent parts, which is zero, positive definite.
 constexpr double kJitter = 1e-12;
 
@@ -181,7 +185,7 @@ bool PriorStrengths::ascend(Hypothesis& hypothesis, Projection& projection, Work
     double gain = 0.0;
     std::size_t best_part = 0, best_strength = 0;
     const Variances own = variances(hypothesis);
-    if (!evidence_.project(own, projection, work) ||
+    if (!evidence_.project(own, Blocks::kOfEachPart, projection, work) ||
         !evidence_.profiles(projection, own, floors(), log_p, work)) {
       return false;
     }
@@ -249,7 +253,7 @@ bool PriorStrengths::search(Hypothesis& best) {
 
 bool PriorStrengths::weigh(const Hypothesis& best) {
   const Variances own = variances(best);
-  if (!evidence_.project(own, projections_.front(), works_.front()) ||
+  if (!evidence_.project(own, Blocks::kAll, projections_.front(), works_.front()) ||
       !evidence_.profiles(projections_.front(), own, floors(), profiles_, works_.front())) {
     return false;
   }
@@ -323,12 +327,13 @@ bool PriorStrengths::gather_other_errors(const Hypothesis& best) {
          e += works_.size()) {
       const Hypothesis changed{best.scales, 1.0, static_cast<int>(e)};
       const Variances there = variances(changed);
-      done[e] = log_posterior(changed, works_[own], error_log_p_[e]) &&
-                        evidence_.project(there, projections_[own], works_[own]) &&
-                        evidence_.profiles(projections_[own], there, floors(), error_profiles_[e],
-                                           works_[own])
-                    ? 1
-                    : 0;
+      done[e] =
+          log_posterior(changed, works_[own], error_log_p_[e]) &&
+                  evidence_.project(there, Blocks::kOfEachPart, projections_[own], works_[own]) &&
+                  evidence_.profiles(projections_[own], there, floors(), error_profiles_[e],
+                                     works_[own])
+              ? 1
+              : 0;
       add_prior(error_profiles_[e]);
     }
   };
@@ -457,14 +462,18 @@ bool PriorStrengths::covariance(blas::Out<double> factor) {
       })) {
     return false;
   }
-  team_->split(r, [&](long begin, long end) {
-    const Eigen::Index columns = end - begin, rows = r - begin;
-    auto block = factor.block(begin, begin, rows, columns);
-    blas::multiply_transposed(-1.0, explained_.rightCols(rows),
-                              explained_.middleCols(begin, columns), 0.0, block);
-    blas::multiply_transposed(1.0, apart_.rightCols(rows), apart_.middleCols(begin, columns), 1.0,
-                              block);
-  });
+  // The lower triangle, in blocks of columns that do not depend on the team.
+  auto subtract_explained = [&](int member) {
+    for (Eigen::Index first = kTogether * member; first < r; first += kTogether * team_->size()) {
+      const Eigen::Index columns = std::min(kTogether, r - first), rows = r - first;
+      auto block = factor.block(first, first, rows, columns);
+      blas::multiply_transposed(-1.0, explained_.rightCols(rows),
+                                explained_.middleCols(first, columns), 0.0, block);
+      blas::multiply_transposed(1.0, apart_.rightCols(rows), apart_.middleCols(first, columns), 1.0,
+                                block);
+    }
+  };
+  team_->run(subtract_explained);
   for (const Hypothesis& each : hypotheses_) {
     for (int i = 0; i < r; ++i) {
       factor(i, i) +=
