@@ -178,10 +178,12 @@ bool PriorStrengths::log_posterior(const Hypothesis& hypothesis, Workspace& work
   return true;
 }
 
-bool PriorStrengths::ascend(Hypothesis& hypothesis, Projection& projection, Workspace& work) const {
+bool PriorStrengths::ascend(Hypothesis& hypothesis, Projection& projection, Workspace& work,
+                            const GiveUp& give_up) const {
   PriorScaleValues& scales = hypothesis.scales;
   Profiles log_p{};
   for (int step = 0; step < kMaxSteps; ++step) {
+    if (give_up && give_up()) return true;
     double gain = 0.0;
     std::size_t best_part = 0, best_strength = 0;
     const Variances own = variances(hypothesis);
@@ -224,7 +226,7 @@ bool PriorStrengths::ascend_error(Hypothesis& hypothesis, Workspace& work) const
   return true;
 }
 
-bool PriorStrengths::search(Hypothesis& best) {
+bool PriorStrengths::search(Hypothesis& best, const GiveUp& give_up) {
   struct Ascent {
     Hypothesis hypothesis;
     double log_p = 0.0;
@@ -237,7 +239,7 @@ bool PriorStrengths::search(Hypothesis& best) {
     const auto own = static_cast<std::size_t>(member);
     for (std::size_t i = own; i < ascents.size(); i += works_.size()) {
       Ascent& each = ascents[i];
-      each.done = ascend(each.hypothesis, projections_[own], works_[own]) &&
+      each.done = ascend(each.hypothesis, projections_[own], works_[own], give_up) &&
                   log_posterior(each.hypothesis, works_[own], each.log_p);
     }
   };
@@ -379,26 +381,27 @@ void PriorStrengths::weigh_candidates(const Hypothesis& best) {
   if (broad_weight_ > 0.0) hypotheses_.push_back(broad());
 }
 
-bool PriorStrengths::climb() {
+bool PriorStrengths::climb(const GiveUp& give_up) {
   for (int step = 0; step < kMaxSteps && gain() > kMinGain; ++step) {
+    if (give_up && give_up()) return true;
     Hypothesis next = candidates_.front();
-    if (!ascend(next, projections_.front(), works_.front()) || !weigh(next)) return false;
+    if (!ascend(next, projections_.front(), works_.front(), give_up) || !weigh(next)) return false;
   }
   return true;
 }
 
 Status PriorStrengths::fit(const blas::In<double>& gram, const Eigen::Ref<const VecX>& right,
-                           const Eigen::MatrixXd& common_variance) {
+                           const Eigen::MatrixXd& common_variance, const GiveUp& give_up) {
   if (!evidence_.take(gram, right, common_variance)) return not_finite();
   if (!estimate_) return {};
   Hypothesis best;
-  if (!search(best) || !weigh(best) || !climb()) keep_held();
+  if (!search(best, give_up) || !weigh(best) || !climb(give_up)) keep_held();
   return {};
 }
 
 Result<bool> PriorStrengths::refit(const blas::In<double>& gram,
                                    const Eigen::Ref<const VecX>& right, bool may_change,
-                                   const Eigen::MatrixXd& common_variance) {
+                                   const Eigen::MatrixXd& common_variance, const GiveUp& give_up) {
   if (!evidence_.holds(gram, right, common_variance)) {
     if (!evidence_.take(gram, right, common_variance)) return not_finite();
     hypotheses_.front().error = std::min(held_error(), evidence_.errors() - 1);
@@ -406,7 +409,7 @@ Result<bool> PriorStrengths::refit(const blas::In<double>& gram,
     if (estimate_ && !weigh(same)) keep_held();
   }
   if (!estimate_ || !may_change || gain() <= kWorthwhile) return false;
-  if (!climb()) keep_held();
+  if (!climb(give_up)) keep_held();
   return true;
 }
 
