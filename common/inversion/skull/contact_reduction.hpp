@@ -50,12 +50,20 @@ class ContactReduction {
   // [T | f0], k x (r + 1)
   Eigen::Map<const Eigen::MatrixXd> response() const { return response_of(response_, size()); }
 
+  // The same in single precision, for sums over the slaves of what their forces do elsewhere.
+  Eigen::Map<const Eigen::MatrixXf> response_single() const {
+    return {single_.get(), size(), window_.count + 1};
+  }
+
   // How the last activate() came from the set before: Q and a, ascending, Y (k x changes) and S
   // (changes x (r + 1)). No changes: it did not.
   int changes() const { return static_cast<int>(left_.size() + joined_.size()); }
   const std::vector<int>& left() const { return left_; }
   Eigen::Map<const Eigen::MatrixXd> change_columns() const {
     return {columns_.get(), size(), changes()};
+  }
+  Eigen::Map<const Eigen::MatrixXf> change_columns_single() const {
+    return {columns_single_.get(), size(), changes()};
   }
   auto change_sizes() const { return sizes_.topRows(changes()); }
 
@@ -80,6 +88,7 @@ class ContactReduction {
   bool list_changes();
   // response_ from before_response_.
   void follow();
+  void round_to_single();
 
   const CondensedOperators& operators_;
   ModeWindow window_;
@@ -91,7 +100,8 @@ class ContactReduction {
   // column-major.
   Eigen::MatrixXd response_, before_response_;
   std::unique_ptr<double[]> columns_;  // D_Ba, then Y
-  Eigen::MatrixXd sizes_;              // S
+  std::unique_ptr<float[]> single_, columns_single_;
+  Eigen::MatrixXd sizes_;  // S
 };
 
 // ContactReach: how far the modes may move before the linear model of a set of active slaves is
