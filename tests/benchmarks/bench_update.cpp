@@ -2,7 +2,11 @@
 // How long an update takes and where the time goes: surgeries played through the daemon's pipeline
 // in this process, beside the time of one triangular solve with the model's factor.
 //   build/release/bin/bench_update --model M.h5 [--passes N] [--csv FILE] S.surgery...
+// With --fields the estimates are written too, for update_difference.py, which compares those of
+// two builds. Every update of the first pass: number of nodes n and of active slaves k, int32; 3n
+// displacements, mm, and n standard deviations, mm, float64; k nodes, int32.
 #include <CLI/CLI.hpp>
+#include <cstdint>
 #include <cstdio>
 #include <filesystem>
 #include <fstream>
@@ -29,7 +33,7 @@ using inversion::UpdateProfile;
 using inversion::UpdateStage;
 
 struct Arguments {
-  std::string model_file, csv, stages_csv;
+  std::string model_file, csv, stages_csv, fields;
   std::vector<std::string> surgeries;
   int passes = 5;
 };
@@ -89,7 +93,21 @@ std::vector<Observation> observations_of(const std::string& file) {
   return observations;
 }
 
-Timed play(Player& player, const std::vector<Observation>& observations, int passes) {
+void write_field(const Estimate& estimate, std::ofstream& out) {
+  const auto write = [&out](const auto* data, std::size_t count) {
+    out.write(reinterpret_cast<const char*>(data),
+              static_cast<std::streamsize>(count * sizeof(*data)));
+  };
+  const std::int32_t sizes[] = {static_cast<std::int32_t>(estimate.displacement.cols()),
+                                static_cast<std::int32_t>(estimate.active_slaves.size())};
+  write(sizes, 2);
+  write(estimate.displacement.data(), static_cast<std::size_t>(estimate.displacement.size()));
+  write(estimate.sd_mm.data(), static_cast<std::size_t>(estimate.sd_mm.size()));
+  write(estimate.active_slaves.data(), estimate.active_slaves.size());
+}
+
+Timed play(Player& player, const std::vector<Observation>& observations, int passes,
+           std::ofstream& fields) {
   Timed timed;
   timed.stage_ms.resize(inversion::kUpdateStages);
   timed.stage_times.resize(inversion::kUpdateStages);
@@ -99,6 +117,7 @@ Timed play(Player& player, const std::vector<Observation>& observations, int pas
       const Stopwatch watch;
       const Update update = value_or_exit(player.pipeline->run(observation));
       timed.ms.push_back(watch.milliseconds());
+      if (pass == 0 && fields.is_open()) write_field(update.estimate, fields);
       timed.active.push_back(update.estimate.contact.active);
       timed.steps.push_back(update.estimate.contact.iterations);
       const UpdateProfile& profile = *player.inverter->profile();
@@ -151,11 +170,13 @@ void run(const Arguments& arguments) {
   std::ofstream stages;
   if (!arguments.stages_csv.empty()) stages.open(arguments.stages_csv);
   if (stages.is_open()) stages << "surgery,stage,p50_ms,over_tsolve,times\n";
+  std::ofstream fields;
+  if (!arguments.fields.empty()) fields.open(arguments.fields, std::ios::binary);
   Player player(head);
   for (const std::string& file : arguments.surgeries) {
     const auto observations = observations_of(file);
     const std::string name = std::filesystem::path(file).stem().string();
-    const Timed timed = play(player, observations, arguments.passes);
+    const Timed timed = play(player, observations, arguments.passes, fields);
     print(name, timed, head.t_solve_ms);
     if (stages.is_open()) write_stages(name, timed, head.t_solve_ms, stages);
     for (std::size_t i = 0; csv.is_open() && i < timed.ms.size(); ++i) {
@@ -169,6 +190,7 @@ void run(const Arguments& arguments) {
 }  // namespace brainshift
 
 int main(int argc, char** argv) {
+  brainshift::linalg::choose_blas_kernel();
   brainshift::Arguments arguments;
   CLI::App app("Times updates and their stages.");
   app.add_option("--model", arguments.model_file, "model file of brainshiftd prepare")->required();
@@ -177,6 +199,7 @@ int main(int argc, char** argv) {
       ->check(CLI::Range(1, 100000));
   app.add_option("--csv", arguments.csv, "file for a row per update");
   app.add_option("--stages-csv", arguments.stages_csv, "file for a row per surgery and stage");
+  app.add_option("--fields", arguments.fields, "file for the estimates, see update_difference.py");
   app.add_option("surgeries", arguments.surgeries, "surgery files of the same case")->required();
   CLI11_PARSE(app, argc, argv);
   brainshift::run(arguments);

@@ -48,3 +48,12 @@ def test_arguments_reach_a_program_that_starts_itself_again():
     told = [line for line in done.stderr.splitlines() if line.startswith("brainshiftd: ")]
     assert len(told) == 1, done.stderr
     assert '--out: "" must name a file' in told[0]
+
+
+def test_every_program_that_names_its_kernel_chooses_it_first():
+    root = pathlib.Path(__file__).parents[2]
+    mains = [path for folder in ("client", "server", "tests") for path in (root / folder).rglob("*.cpp")
+             if "int main(" in path.read_text()]
+    naming = [path for path in mains if '"common/linalg/openblas.hpp"' in path.read_text()]
+    assert len(naming) > 5
+    assert [path.name for path in naming if "choose_blas_kernel()" not in path.read_text()] == []

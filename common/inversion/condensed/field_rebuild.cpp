@@ -5,6 +5,7 @@
 #include <cmath>
 #include <numeric>
 
+#include "common/linalg/column_sums.hpp"
 #include "common/operators/encode_columns.hpp"
 
 namespace brainshift::inversion {
@@ -80,28 +81,6 @@ FarField plan_far_field(const CondensedOperators& operators, ModeWindow window,
   return plan;
 }
 
-// out += sum over j of factor[j] column[j], for `rows` numbers from `first` on. Plain loops in the
-// place of BLAS: its kernels round the last numbers of an array otherwise than the others, so that
-// a node's sum would depend on where it stands; and four columns in one pass take less time than
-// four passes.
-void add_columns(const std::vector<const float*>& column, const std::vector<float>& factor,
-                 long first, long rows, float* __restrict out) {
-  std::size_t j = 0;
-  for (; j + 4 <= column.size(); j += 4) {
-    const float *a = column[j] + first, *b = column[j + 1] + first, *c = column[j + 2] + first,
-                *d = column[j + 3] + first;
-    const float fa = factor[j], fb = factor[j + 1], fc = factor[j + 2], fd = factor[j + 3];
-    for (long i = 0; i < rows; ++i) {
-      out[i] = (((out[i] + fa * a[i]) + fb * b[i]) + fc * c[i]) + fd * d[i];
-    }
-  }
-  for (; j < column.size(); ++j) {
-    const float* a = column[j] + first;
-    const float fa = factor[j];
-    for (long i = 0; i < rows; ++i) out[i] += fa * a[i];
-  }
-}
-
 // out_i = sum over j of weight_j a_ij^2; without weights they are 1.
 void sum_squares(const Eigen::Ref<const Eigen::MatrixXf, 0, Eigen::OuterStride<>>& a,
                  const float* weight, Eigen::Ref<Eigen::VectorXf> out) {
@@ -123,7 +102,6 @@ FieldRebuild::FieldRebuild(const CondensedOperators& operators, ModeWindow windo
       control_contact_(
           decode_rows(operators.responses, operators.control,
                       column_range(operators.contact_column(0), operators.num_slaves()), team)),
-      response_(operators.num_slaves(), window.count),
       factor_(window.count, window.count),
       conditioned_(control_modes_.rows(), window.count),
       spread_(control_modes_.rows(), window.count),
@@ -203,7 +181,7 @@ void FieldRebuild::sum_spare(ThreadTeam& team) {
   team.split(spare_modes_.rows(), [&](long begin, long end) {
     float* out = field_.data() + start + begin;
     std::fill(out, out + (end - begin), 0.0F);
-    add_columns(columns_, factors_, begin, end - begin, out);
+    linalg::add_columns(columns_.data(), factors_.data(), columns_.size(), begin, end - begin, out);
   });
 }
 
@@ -302,8 +280,7 @@ void FieldRebuild::standard_deviation(ThreadTeam& team, const ContactReduction& 
   // Single precision is exact enough for a standard deviation.
   factor_.setZero(r, r);
   factor_.triangularView<Eigen::Lower>() = covariance_factor.cast<float>();
-  Eigen::Map<Eigen::MatrixXf> response(response_.data(), k, r);
-  if (k > 0) response = contact.response().leftCols(r).cast<float>();
+  const auto response = contact.response_single().leftCols(r);
   Eigen::Map<Eigen::MatrixXf> columns(contact_storage_.get(), control_contact_.rows(), k);
   team.split(static_cast<long>(operators_.control.size()), [&](long begin, long end) {
     const Eigen::Index first = 3 * begin, rows = 3 * (end - begin);

@@ -60,10 +60,12 @@ inline constexpr double kLostByMean = 1.0;
 inline constexpr double kRoughDecrement = 0.2;
 
 struct DescentLimits {
-  int max_steps = 100;                // of one descent
-  std::stop_token stop;               // looked at before every step and every set of contact
-  std::function<bool()> out_of_time;  // looked at after every step and before every set
-  std::function<void()> on_step;      // after every step, for the history
+  int max_steps = 100;  // of one descent
+  // Looked at before every step, every set of contact and every step of a search for strengths; the
+  // second after steps instead of before them. By any thread.
+  std::stop_token stop;
+  std::function<bool()> out_of_time;
+  std::function<void()> on_step;  // after every step, for the history
 
   bool over() const { return stop.stop_requested() || (out_of_time && out_of_time()); }
 };

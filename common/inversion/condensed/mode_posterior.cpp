@@ -17,6 +17,22 @@ namespace blas = linalg::blas;
 // A direction of which the source knows a hundredth of what the others do is damped by half.
 constexpr double kDamping = 0.01;
 
+// Parts in which columns are multiplied, whatever the number of threads is: kernels of BLAS round a
+// column by where it stands.
+constexpr long kParts = 4;
+
+// body(begin, end) for each part of [0, count).
+template <typename Body>
+void in_parts(ThreadTeam& team, long count, Body&& body) {
+  auto share = [&](int member) {
+    for (long part = member; part < kParts; part += team.size()) {
+      const long begin = count * part / kParts, end = count * (part + 1) / kParts;
+      if (begin < end) body(begin, end);
+    }
+  };
+  team.run(share);
+}
+
 }  // namespace
 
 bool SourceCheck::run(const blas::In<double>& gram, const Eigen::Ref<const VecX>& right,
@@ -80,6 +96,8 @@ void ModePosterior::reserve(int data) {
   if (3 * data <= jacobian_.rows()) return;
   linalg::replace(residual_, 3 * data);
   linalg::replace(changed_, 3 * data, ContactReduction::kMaxChanges);
+  linalg::replace(product_, 3 * data,
+                  std::max<Eigen::Index>(ContactReduction::kMaxChanges, window_.count + 1));
   linalg::replace(jacobian_, 3 * data, SparseData::kMaxCommonErrors + window_.count + 1);
 }
 
@@ -87,11 +105,12 @@ void ModePosterior::reserve(int data) {
 void ModePosterior::follow_changes(SampledOperators& sampled, const ContactReduction& reduction,
                                    ThreadTeam& team) {
   auto moved = changed_.topLeftCorner(rows_, reduction.changes());
-  const auto contact = sampled.contact(reduction.active());
-  const auto columns = reduction.change_columns();
-  team.split(moved.cols(), [&](long begin, long end) {
-    blas::multiply(1.0, contact, columns.middleCols(begin, end - begin), 0.0,
-                   moved.middleCols(begin, end - begin));
+  const auto contact = sampled.contact_single(reduction.active());
+  const auto columns = reduction.change_columns_single();
+  in_parts(team, moved.cols(), [&](long begin, long end) {
+    auto product = product_.block(0, begin, rows_, end - begin);
+    blas::multiply(1.0F, contact, columns.middleCols(begin, end - begin), 0.0F, product);
+    moved.middleCols(begin, end - begin) = product.cast<double>();
   });
   const auto left = sampled.contact(reduction.left());
   moved.leftCols(left.cols()) -= left;
@@ -112,11 +131,12 @@ void ModePosterior::linearise(SampledOperators& sampled, const ContactReduction&
   if (same_data && reduction.changes() > 0) {
     follow_changes(sampled, reduction, team);
   } else if (j = sampled.free_body(); reduction.size() > 0) {
-    const auto contact = sampled.contact(reduction.active());
-    const auto response = reduction.response();
-    team.split(r + 1, [&](long begin, long end) {
-      blas::multiply(-1.0, contact, response.middleCols(begin, end - begin), 1.0,
-                     j.middleCols(common_ + begin, end - begin));
+    const auto contact = sampled.contact_single(reduction.active());
+    const auto response = reduction.response_single();
+    in_parts(team, r + 1, [&](long begin, long end) {
+      auto product = product_.block(0, begin, rows_, end - begin);
+      blas::multiply(1.0F, contact, response.middleCols(begin, end - begin), 0.0F, product);
+      j.middleCols(common_ + begin, end - begin) -= product.cast<double>();
     });
   }
   // Parts of the lower triangle with about as much work for each thread.

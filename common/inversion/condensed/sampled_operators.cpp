@@ -9,6 +9,7 @@
 #include <sstream>
 
 #include "common/inversion/contract/data_check.hpp"
+#include "common/linalg/column_sums.hpp"
 #include "common/linalg/growing_matrix.hpp"
 #include "common/operators/encode_columns.hpp"
 
@@ -34,6 +35,7 @@ void SampledOperators::reserve(int data) {
   const std::size_t contact = 3 * static_cast<std::size_t>(data) * slaves;
   // Uninitialised: memory is used as it is touched.
   std::unique_ptr<double[]> columns(new double[contact]), whitened(new double[contact]);
+  std::unique_ptr<float[]> single(new float[contact]);
   linalg::replace(rows_, 4, data);
   linalg::replace(barycentric_, 4, data);
   linalg::replace(weights_, 4, data);
@@ -46,8 +48,10 @@ void SampledOperators::reserve(int data) {
   linalg::replace(row_weights_, 3 * data);
   linalg::replace(forced_, 3 * data);
   missing_.reserve(slaves);
+  columns_.reserve(slaves);
   contact_columns_ = std::move(columns);
   whitened_contact_ = std::move(whitened);
+  whitened_single_ = std::move(single);
   capacity_ = data;  // all of it is there
 }
 
@@ -208,18 +212,28 @@ void SampledOperators::sample_contact(const std::vector<int>& slaves) {
   });
 }
 
-Eigen::Map<const Eigen::MatrixXd> SampledOperators::contact(const std::vector<int>& active) {
+template <typename T>
+Eigen::Map<const Eigen::Matrix<T, Eigen::Dynamic, Eigen::Dynamic>> SampledOperators::whiten_contact(
+    const std::vector<int>& active, T* to) {
   sample_contact(active);
-  Eigen::Map<Eigen::MatrixXd> whitened(whitened_contact_.get(), rows(),
-                                       static_cast<Eigen::Index>(active.size()));
+  Eigen::Map<Eigen::Matrix<T, Eigen::Dynamic, Eigen::Dynamic>> whitened(
+      to, rows(), static_cast<Eigen::Index>(active.size()));
   team_.split(whitened.cols(), [&](long begin, long end) {
     for (long j = begin; j < end; ++j) {
       const Eigen::Map<const VecX> column(contact_column(active[static_cast<std::size_t>(j)]),
                                           rows());
-      whitened.col(j) = row_weights_.head(rows()).cwiseProduct(column);
+      whitened.col(j) = row_weights_.head(rows()).cwiseProduct(column).template cast<T>();
     }
   });
-  return {whitened_contact_.get(), rows(), whitened.cols()};
+  return {to, rows(), whitened.cols()};
+}
+
+Eigen::Map<const Eigen::MatrixXd> SampledOperators::contact(const std::vector<int>& active) {
+  return whiten_contact(active, whitened_contact_.get());
+}
+
+Eigen::Map<const Eigen::MatrixXf> SampledOperators::contact_single(const std::vector<int>& active) {
+  return whiten_contact(active, whitened_single_.get());
 }
 
 void SampledOperators::subtract_contact(const std::vector<int>& active,
@@ -227,10 +241,12 @@ void SampledOperators::subtract_contact(const std::vector<int>& active,
   sample_contact(active);
   auto sum = forced_.head(rows());
   sum.setZero();
-  for (std::size_t j = 0; j < active.size(); ++j) {
-    linalg::blas::add_scaled(rows(), forces[static_cast<Eigen::Index>(j)],
-                             contact_column(active[j]), sum.data());
-  }
+  columns_.clear();
+  for (const int slave : active) columns_.push_back(contact_column(slave));
+  team_.split(rows(), [&](long begin, long end) {
+    linalg::add_columns(columns_.data(), forces.data(), columns_.size(), begin, end - begin,
+                        sum.data() + begin);
+  });
   out.array() -= row_weights_.head(rows()).array() * sum.array();
 }
 
@@ -239,10 +255,12 @@ void SampledOperators::contact_transposed(const std::vector<int>& active, const 
   sample_contact(active);
   auto weighted = forced_.head(rows());
   weighted = row_weights_.head(rows()).cwiseProduct(v);
-  for (std::size_t j = 0; j < active.size(); ++j) {
-    out[static_cast<Eigen::Index>(j)] =
-        Eigen::Map<const VecX>(contact_column(active[j]), rows()).dot(weighted);
-  }
+  team_.split(static_cast<long>(active.size()), [&](long begin, long end) {
+    for (long j = begin; j < end; ++j) {
+      out[j] = Eigen::Map<const VecX>(contact_column(active[static_cast<std::size_t>(j)]), rows())
+                   .dot(weighted);
+    }
+  });
 }
 
 }  // namespace brainshift::inversion

@@ -129,7 +129,7 @@ Status SettledLoads::descend(const DescentLimits& limits, Round& round) {
   if (!descended) return tl::unexpected(descended.error());
   round.outcome = *descended;
   const bool converged = round.outcome == EstimateStatus::kConverged;
-  const auto changed = refit(converged && round.number < kMaxRounds / 2);
+  const auto changed = refit(converged && round.number < kMaxRounds / 2, limits);
   if (!changed) return tl::unexpected(changed.error());
   if (!*changed) return {};
   round.depth = Depth::kRough;
@@ -187,20 +187,20 @@ Status SettledLoads::distrust_outliers(const DescentLimits& limits) {
   return {};
 }
 
-Status SettledLoads::fit() {
+Status SettledLoads::fit(const DescentLimits& limits) {
   const StageClock clock(profile_, UpdateStage::kHypotheses);
   return strengths_.fit(descent_.posterior().gram(), descent_.posterior().right_hand_side(),
-                        data_->common_variance);
+                        data_->common_variance, [&limits] { return limits.over(); });
 }
 
-Result<bool> SettledLoads::refit(bool may_change) {
+Result<bool> SettledLoads::refit(bool may_change, const DescentLimits& limits) {
   const StageClock clock(profile_, UpdateStage::kHypotheses);
   return strengths_.refit(descent_.posterior().gram(), descent_.posterior().right_hand_side(),
-                          may_change, data_->common_variance);
+                          may_change, data_->common_variance, [&limits] { return limits.over(); });
 }
 
 Status SettledLoads::find_strengths(const DescentLimits& limits, EstimateStatus& outcome) {
-  if (auto status = fit(); !status) return status;
+  if (auto status = fit(limits); !status) return status;
   for (int fit = 1;; ++fit) {
     const auto jumped = descent_.jump(sampled_, strengths_, limits);
     if (!jumped) return tl::unexpected(jumped.error());
@@ -212,7 +212,7 @@ Status SettledLoads::find_strengths(const DescentLimits& limits, EstimateStatus&
     }
     // Strengths that change need loads of their own.
     const bool may_change = outcome == EstimateStatus::kConverged && fit < kMaxFits;
-    const auto changed = refit(may_change);
+    const auto changed = refit(may_change, limits);
     if (!changed) return tl::unexpected(changed.error());
     if (!*changed) return {};
   }

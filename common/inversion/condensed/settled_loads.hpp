@@ -87,8 +87,8 @@ class SettledLoads {
   double upper_quartile(int count);
   Status distrust_outliers(const DescentLimits& limits);
   // PriorStrengths::fit and refit for the present linear model.
-  Status fit();
-  Result<bool> refit(bool may_change);
+  Status fit(const DescentLimits& limits);
+  Result<bool> refit(bool may_change, const DescentLimits& limits);
   // Strengths and rough descents in turn until the strengths stay.
   Status find_strengths(const DescentLimits& limits, EstimateStatus& outcome);
   // Weights and places of the data for the present estimate; whether anything changed.

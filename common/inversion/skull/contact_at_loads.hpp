@@ -68,8 +68,8 @@ class ContactAtLoads {
   void begin_set();
   // The next set by what pulls and what penetrates in the solution of this one.
   void exchange();
-  // The next set of projected steps, free to press: slaves that do, and those that penetrate.
-  void follow();
+  // The next set of projected steps, free to press: slaves that do, and those that are deeper.
+  void follow(double deeper_mm);
   // all_forces_ and penetration_ a part `step` of the way from before_ to those of the set, without
   // forces that pull.
   void go(double step);

@@ -9,6 +9,8 @@ namespace {
 
 namespace blas = linalg::blas;
 
+using Blocks = StrengthEvidence::Blocks;
+
 constexpr int kMaxSteps = 60;
 // Of ln p, which is known to about 1e-7.
 constexpr double kMinGain = 1e-6;
@@ -16,6 +18,8 @@ constexpr double kMinGain = 1e-6;
 // are kept.
 constexpr double kMinWeight = 0.01;
 constexpr std::size_t kMaxHypotheses = 20;
+// Columns of a triangular matrix that are computed at once.
+constexpr Eigen::Index kTogether = 24;
 // Makes the covariance of absent parts, which is zero, positive definite.
 constexpr double kJitter = 1e-12;
 
@@ -174,14 +178,16 @@ bool PriorStrengths::log_posterior(const Hypothesis& hypothesis, Workspace& work
   return true;
 }
 
-bool PriorStrengths::ascend(Hypothesis& hypothesis, Projection& projection, Workspace& work) const {
+bool PriorStrengths::ascend(Hypothesis& hypothesis, Projection& projection, Workspace& work,
+                            const GiveUp& give_up) const {
   PriorScaleValues& scales = hypothesis.scales;
   Profiles log_p{};
   for (int step = 0; step < kMaxSteps; ++step) {
+    if (give_up && give_up()) return true;
     double gain = 0.0;
     std::size_t best_part = 0, best_strength = 0;
     const Variances own = variances(hypothesis);
-    if (!evidence_.project(own, projection, work) ||
+    if (!evidence_.project(own, Blocks::kOfEachPart, projection, work) ||
         !evidence_.profiles(projection, own, floors(), log_p, work)) {
       return false;
     }
@@ -220,7 +226,7 @@ bool PriorStrengths::ascend_error(Hypothesis& hypothesis, Workspace& work) const
   return true;
 }
 
-bool PriorStrengths::search(Hypothesis& best) {
+bool PriorStrengths::search(Hypothesis& best, const GiveUp& give_up) {
   struct Ascent {
     Hypothesis hypothesis;
     double log_p = 0.0;
@@ -233,7 +239,7 @@ bool PriorStrengths::search(Hypothesis& best) {
     const auto own = static_cast<std::size_t>(member);
     for (std::size_t i = own; i < ascents.size(); i += works_.size()) {
       Ascent& each = ascents[i];
-      each.done = ascend(each.hypothesis, projections_[own], works_[own]) &&
+      each.done = ascend(each.hypothesis, projections_[own], works_[own], give_up) &&
                   log_posterior(each.hypothesis, works_[own], each.log_p);
     }
   };
@@ -249,7 +255,7 @@ bool PriorStrengths::search(Hypothesis& best) {
 
 bool PriorStrengths::weigh(const Hypothesis& best) {
   const Variances own = variances(best);
-  if (!evidence_.project(own, projections_.front(), works_.front()) ||
+  if (!evidence_.project(own, Blocks::kAll, projections_.front(), works_.front()) ||
       !evidence_.profiles(projections_.front(), own, floors(), profiles_, works_.front())) {
     return false;
   }
@@ -323,12 +329,13 @@ bool PriorStrengths::gather_other_errors(const Hypothesis& best) {
          e += works_.size()) {
       const Hypothesis changed{best.scales, 1.0, static_cast<int>(e)};
       const Variances there = variances(changed);
-      done[e] = log_posterior(changed, works_[own], error_log_p_[e]) &&
-                        evidence_.project(there, projections_[own], works_[own]) &&
-                        evidence_.profiles(projections_[own], there, floors(), error_profiles_[e],
-                                           works_[own])
-                    ? 1
-                    : 0;
+      done[e] =
+          log_posterior(changed, works_[own], error_log_p_[e]) &&
+                  evidence_.project(there, Blocks::kOfEachPart, projections_[own], works_[own]) &&
+                  evidence_.profiles(projections_[own], there, floors(), error_profiles_[e],
+                                     works_[own])
+              ? 1
+              : 0;
       add_prior(error_profiles_[e]);
     }
   };
@@ -374,26 +381,27 @@ void PriorStrengths::weigh_candidates(const Hypothesis& best) {
   if (broad_weight_ > 0.0) hypotheses_.push_back(broad());
 }
 
-bool PriorStrengths::climb() {
+bool PriorStrengths::climb(const GiveUp& give_up) {
   for (int step = 0; step < kMaxSteps && gain() > kMinGain; ++step) {
+    if (give_up && give_up()) return true;
     Hypothesis next = candidates_.front();
-    if (!ascend(next, projections_.front(), works_.front()) || !weigh(next)) return false;
+    if (!ascend(next, projections_.front(), works_.front(), give_up) || !weigh(next)) return false;
   }
   return true;
 }
 
 Status PriorStrengths::fit(const blas::In<double>& gram, const Eigen::Ref<const VecX>& right,
-                           const Eigen::MatrixXd& common_variance) {
+                           const Eigen::MatrixXd& common_variance, const GiveUp& give_up) {
   if (!evidence_.take(gram, right, common_variance)) return not_finite();
   if (!estimate_) return {};
   Hypothesis best;
-  if (!search(best) || !weigh(best) || !climb()) keep_held();
+  if (!search(best, give_up) || !weigh(best) || !climb(give_up)) keep_held();
   return {};
 }
 
 Result<bool> PriorStrengths::refit(const blas::In<double>& gram,
                                    const Eigen::Ref<const VecX>& right, bool may_change,
-                                   const Eigen::MatrixXd& common_variance) {
+                                   const Eigen::MatrixXd& common_variance, const GiveUp& give_up) {
   if (!evidence_.holds(gram, right, common_variance)) {
     if (!evidence_.take(gram, right, common_variance)) return not_finite();
     hypotheses_.front().error = std::min(held_error(), evidence_.errors() - 1);
@@ -401,7 +409,7 @@ Result<bool> PriorStrengths::refit(const blas::In<double>& gram,
     if (estimate_ && !weigh(same)) keep_held();
   }
   if (!estimate_ || !may_change || gain() <= kWorthwhile) return false;
-  if (!climb()) keep_held();
+  if (!climb(give_up)) keep_held();
   return true;
 }
 
@@ -457,14 +465,18 @@ bool PriorStrengths::covariance(blas::Out<double> factor) {
       })) {
     return false;
   }
-  team_->split(r, [&](long begin, long end) {
-    const Eigen::Index columns = end - begin, rows = r - begin;
-    auto block = factor.block(begin, begin, rows, columns);
-    blas::multiply_transposed(-1.0, explained_.rightCols(rows),
-                              explained_.middleCols(begin, columns), 0.0, block);
-    blas::multiply_transposed(1.0, apart_.rightCols(rows), apart_.middleCols(begin, columns), 1.0,
-                              block);
-  });
+  // The lower triangle, in blocks of columns that do not depend on the team.
+  auto subtract_explained = [&](int member) {
+    for (Eigen::Index first = kTogether * member; first < r; first += kTogether * team_->size()) {
+      const Eigen::Index columns = std::min(kTogether, r - first), rows = r - first;
+      auto block = factor.block(first, first, rows, columns);
+      blas::multiply_transposed(-1.0, explained_.rightCols(rows),
+                                explained_.middleCols(first, columns), 0.0, block);
+      blas::multiply_transposed(1.0, apart_.rightCols(rows), apart_.middleCols(first, columns), 1.0,
+                                block);
+    }
+  };
+  team_->run(subtract_explained);
   for (const Hypothesis& each : hypotheses_) {
     for (int i = 0; i < r; ++i) {
       factor(i, i) +=

@@ -43,6 +43,7 @@
 
 #include <array>
 #include <cmath>
+#include <functional>
 #include <vector>
 
 #include "common/configuration/case_config.hpp"
@@ -67,6 +68,8 @@ inline constexpr double kWorthwhile = 1.0;
 
 class PriorStrengths {
  public:
+  using GiveUp = std::function<bool()>;
+
   // columns: of the operators, by part. estimate: false keeps every strength at 1. Keeps a
   // reference to the team, which shares the work.
   PriorStrengths(const PerPart<int>& columns, ModeWindow window, int max_common, bool estimate,
@@ -74,14 +77,17 @@ class PriorStrengths {
 
   // gram: G, lower triangle; right: b; the common errors come first, with their variances
   // (SparseData::common_variance). kNotFinite when G is not positive semidefinite or not finite.
+  // give_up: asked before every step of a search, by any thread of the team; where it says so the
+  // search ends where it is, and the neighbours of that hypothesis are weighed.
   Status fit(const linalg::blas::In<double>& gram, const Eigen::Ref<const VecX>& right,
-             const Eigen::MatrixXd& common_variance = {});
+             const Eigen::MatrixXd& common_variance = {}, const GiveUp& give_up = {});
   // The same for another linear model of the same data. The held hypothesis stays while no
   // neighbour is more probable by kWorthwhile: the data hardly tell such two apart, and a search
   // would wander between them. It stays in any case without may_change, for loads that are
   // its own and that nobody will descend from again. Whether it did not stay.
   Result<bool> refit(const linalg::blas::In<double>& gram, const Eigen::Ref<const VecX>& right,
-                     bool may_change, const Eigen::MatrixXd& common_variance = {});
+                     bool may_change, const Eigen::MatrixXd& common_variance = {},
+                     const GiveUp& give_up = {});
   // Every strength as in the case, before the first fit(), and no floor.
   void reset();
   // In units of the case's standard deviation. Without effect where strengths are not estimated.
@@ -151,10 +157,11 @@ class PriorStrengths {
   PriorScaleValues absent_parts() const;
   PerPart<double> floors() const;
   // To the next maximum over one part at a time.
-  bool ascend(Hypothesis& hypothesis, Projection& projection, Workspace& work) const;
+  bool ascend(Hypothesis& hypothesis, Projection& projection, Workspace& work,
+              const GiveUp& give_up) const;
   // To the most probable error for these strengths.
   bool ascend_error(Hypothesis& hypothesis, Workspace& work) const;
-  bool search(Hypothesis& best);
+  bool search(Hypothesis& best, const GiveUp& give_up);
   bool weigh(const Hypothesis& best);
   // The held hypothesis alone, where rounding leaves no profile: an update is worth more than the
   // weights of its neighbours.
@@ -170,7 +177,7 @@ class PriorStrengths {
   // Of ln p, from the held hypothesis to the most probable neighbour; they have been weighed.
   double gain() const { return candidates_.empty() ? 0.0 : candidates_.front().weight; }
   // From the held hypothesis to one that is more probable than its neighbours.
-  bool climb();
+  bool climb(const GiveUp& give_up);
 
   // work_on(index, hypothesis, workspace) for each of them, shared by the team; false when any is.
   template <typename Work>

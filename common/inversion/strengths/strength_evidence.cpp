@@ -5,6 +5,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "common/linalg/column_sums.hpp"
+
 namespace brainshift::inversion {
 namespace {
 
@@ -140,14 +142,20 @@ void StrengthEvidence::factorise_parts() {
 
 bool StrengthEvidence::fill_omega(const Variances& variances, linalg::GrowingMatrix& omega) const {
   omega.resize(rank_, rank_);
+  PerPart<double> factors{};
+  PerPart<const double*> parts{}, columns{};
+  std::size_t present = 0;
+  for (std::size_t part = 0; part < count_.size(); ++part) {
+    if (count_[part] == 0 || variances[part] == 0.0) continue;
+    factors[present] = variances[part];
+    parts[present++] = of_part_[part].data();
+  }
   for (Eigen::Index j = 0; j < rank_; ++j) {
     auto column = omega.col(j).tail(rank_ - j);
     column = of_common_[static_cast<std::size_t>(variances.error)].col(j).tail(rank_ - j);
     column[0] += 1.0;
-    for (std::size_t part = 0; part < count_.size(); ++part) {
-      if (count_[part] == 0 || variances[part] == 0.0) continue;
-      column += variances[part] * of_part_[part].col(j).tail(rank_ - j);
-    }
+    for (std::size_t i = 0; i < present; ++i) columns[i] = parts[i] + rank_ * j;
+    linalg::add_columns(columns.data(), factors.data(), present, j, rank_ - j, column.data());
   }
   return rank_ == 0 || blas::cholesky(omega);
 }
@@ -162,7 +170,8 @@ bool StrengthEvidence::log_evidence(const Variances& variances, Workspace& work,
   return std::isfinite(out);
 }
 
-bool StrengthEvidence::project(const Variances& variances, Projection& out, Workspace& work) const {
+bool StrengthEvidence::project(const Variances& variances, Blocks blocks, Projection& out,
+                               Workspace& work) const {
   if (!fill_omega(variances, work.omega)) return false;
   const Eigen::Index columns = roots_in_all_;
   out.whitened_parts = roots_.topLeftCorner(rank_, columns);
@@ -172,7 +181,16 @@ bool StrengthEvidence::project(const Variances& variances, Projection& out, Work
   work.whitened = y_;
   work.omega.triangularView<Eigen::Lower>().solveInPlace(work.whitened);
   blas::solve_lower(work.omega, out.whitened_parts);
-  blas::gram(out.whitened_parts, 0.0, out.parts);
+  if (blocks == Blocks::kAll) {
+    blas::gram(out.whitened_parts, 0.0, out.parts);
+  } else {
+    for (std::size_t part = 0; part < count_.size(); ++part) {
+      const Eigen::Index first = first_root_[part], count = root_count_[part];
+      if (count == 0) continue;
+      blas::gram(out.whitened_parts.middleCols(first, count), 0.0,
+                 out.parts.block(first, first, count, count));
+    }
+  }
   out.data.noalias() = out.whitened_parts.transpose() * work.whitened;
   return true;
 }

@@ -57,8 +57,10 @@ class StrengthEvidence {
     linalg::GrowingVector diagonal, beside, pivots, factor;  // of a tridiagonal matrix
   };
   // W^T Omega^-1 [W y] of one hypothesis.
+  enum class Blocks { kOfEachPart, kAll };
   struct Projection {
-    linalg::GrowingMatrix parts;  // C; of its blocks those on and below the diagonal
+    // C; of its blocks those on the diagonal, and with kAll those below it. Their lower triangles.
+    linalg::GrowingMatrix parts;
     linalg::GrowingVector data;
     linalg::GrowingMatrix whitened_parts;
   };
@@ -79,13 +81,16 @@ class StrengthEvidence {
 
   // ln p(d | v) but for a constant that is the same for all v.
   [[nodiscard]] bool log_evidence(const Variances& variances, Workspace& work, double& out) const;
-  [[nodiscard]] bool project(const Variances& variances, Projection& out, Workspace& work) const;
+  // blocks: changed_profiles() wants all of them, profiles() a fifth of the work.
+  [[nodiscard]] bool project(const Variances& variances, Blocks blocks, Projection& out,
+                             Workspace& work) const;
   // Of the hypothesis that was projected. floors: variance that a part has whatever its strength.
   // ln p(t) - ln p(0) for t = strength^2 + floor; parts without modes are left as they are.
   [[nodiscard]] bool profiles(const Projection& projection, const Variances& variances,
                               const PerPart<double>& floors, PerPart<StrengthProfile>& out,
                               Workspace& work) const;
-  // The same when the variance of `part`, which has modes, is `variance` instead.
+  // The same when the variance of `part`, which has modes, is `variance` instead. Precondition: all
+  // blocks were projected.
   [[nodiscard]] bool changed_profiles(const Projection& projection, const Variances& variances,
                                       std::size_t part, double variance,
                                       const PerPart<double>& floors, PerPart<StrengthProfile>& out,

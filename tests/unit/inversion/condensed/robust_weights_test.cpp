@@ -3,6 +3,7 @@
 
 #include <boost/math/distributions/chi_squared.hpp>
 
+#include <algorithm>
 #include <cmath>
 
 #include "common/configuration/case_config.hpp"
@@ -113,6 +114,7 @@ TEST(RobustWeights, SourcesThatKeepTheirDataKeepTheirWeights) {
     RobustWeights followed = weights;
     SparseData now = whole(points + 20);
     now.sources = {{"ius", 0, points}, {"tracks", points, 20}};
+    followed.reserve(std::max(120, points + 20));  // as where data grow while they move
     followed.follow(before, now);
     ASSERT_EQ(followed.values().size(), points + 20);
     EXPECT_EQ(followed.values()[points + 5], distrusted);

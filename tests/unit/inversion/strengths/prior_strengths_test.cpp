@@ -195,6 +195,41 @@ TEST(PriorStrengths, DoNotDependOnEarlierData) {
   }
 }
 
+// A search is asked before each of its steps, and ends where it is with hypotheses that count.
+TEST(PriorStrengths, ASearchThatIsGivenUpEndsWhereItIs) {
+  const Problem problem = drawn(strengths(0.5, 0.0, 2.0, 4.0), 3);
+  ThreadTeam one(1);
+  PriorStrengths result(kColumns, kWindow, kCommon, true, 0.0, one);
+  int allowed = 0, asked = 0;
+  const auto give_up = [&] { return ++asked > allowed; };
+  const auto fit = [&](int steps) {
+    allowed = steps;
+    asked = 0;
+    ASSERT_TRUE(result.fit(problem.gram(), problem.right(), {}, give_up));
+    double sum = 0.0;
+    for (const Hypothesis& each : result.hypotheses()) sum += each.weight;
+    EXPECT_NEAR(sum, 1.0, 1e-12);
+  };
+  constexpr int kNoBound = 100000;
+  fit(kNoBound);
+  const int steps = asked;
+  const PriorScaleValues end = result.held();
+  ASSERT_EQ(end, fitted(problem).held());
+  ASSERT_GT(steps, 6) << "the test shows nothing";
+  fit(0);
+  EXPECT_LE(asked, 3);  // by two ascents, and before what would follow them
+  EXPECT_NE(result.held(), end);
+  fit(steps);
+  EXPECT_EQ(result.held(), end);
+
+  const Problem other = drawn(strengths(4.0, 0.5, 0.0, 0.125), 7);
+  const PriorScaleValues held = result.held();
+  asked = allowed = 0;
+  ASSERT_EQ(result.refit(other.gram(), other.right(), true, {}, give_up), true);
+  EXPECT_EQ(asked, 1);
+  EXPECT_EQ(result.held(), held);
+}
+
 // By the formulas of each hypothesis, with dense inverses.
 void expect_moments_of_the_mixture(const Problem& problem, PriorStrengths result,
                                    std::size_t floored = 0, double floor = 0.0) {

@@ -13,6 +13,8 @@ namespace {
 
 using Eigen::MatrixXd;
 
+constexpr auto kAll = StrengthEvidence::Blocks::kAll,
+               kOfEachPart = StrengthEvidence::Blocks::kOfEachPart;
 constexpr int kShared = 2, kLoads = 30, kRows = 120;
 constexpr PerPart<int> kCounts = {3, 0, 7, 0, 0, 0, 20, 0, 0};
 constexpr std::size_t kPresentPart[] = {0, 2, 6};
@@ -85,7 +87,7 @@ TEST_F(StrengthEvidenceTest, AProfileIsTheEvidenceOfEveryStrengthOfAPart) {
   floors[6] = 0.04;
   const auto variances = of(0.0, 0.25, 4.04);
   PerPart<StrengthProfile> found{};
-  ASSERT_TRUE(evidence.project(variances, projection, work));
+  ASSERT_TRUE(evidence.project(variances, kAll, projection, work));
   ASSERT_TRUE(evidence.profiles(projection, variances, floors, found, work));
   for (const std::size_t part : kPresentPart) {
     for (std::size_t i = 1; i < kStrengths.size(); ++i) {
@@ -104,14 +106,14 @@ TEST_F(StrengthEvidenceTest, ProfilesOfAChangedPartAreThoseOfTheChangedHypothesi
   const auto variances = of(1.0, 0.0, 4.0);
   StrengthEvidence::Projection changed_projection;
   PerPart<StrengthProfile> found{}, expected{};
-  ASSERT_TRUE(evidence.project(variances, projection, work));
+  ASSERT_TRUE(evidence.project(variances, kAll, projection, work));
   for (const std::size_t part : kPresentPart) {
     for (const double variance : {0.0, 0.25, 64.0}) {
       auto changed = variances;
       changed[part] = variance;
       ASSERT_TRUE(
           evidence.changed_profiles(projection, variances, part, variance, floors, found, work));
-      ASSERT_TRUE(evidence.project(changed, changed_projection, work));
+      ASSERT_TRUE(evidence.project(changed, kOfEachPart, changed_projection, work));
       ASSERT_TRUE(evidence.profiles(changed_projection, changed, floors, expected, work));
       for (const std::size_t each : kPresentPart) {
         for (std::size_t i = 0; i < kStrengths.size(); ++i) {
@@ -193,7 +195,7 @@ TEST_F(StrengthEvidenceTest, NumbersThatAreNotFiniteAreRejected) {
 TEST_F(StrengthEvidenceTest, DataThatSayNothingLeaveEveryStrengthAsProbable) {
   ASSERT_TRUE(evidence.take(MatrixXd::Zero(kLoads, kLoads), VecX::Zero(kLoads)));
   PerPart<StrengthProfile> found{};
-  ASSERT_TRUE(evidence.project(of(1, 1, 1), projection, work));
+  ASSERT_TRUE(evidence.project(of(1, 1, 1), kAll, projection, work));
   ASSERT_TRUE(evidence.profiles(projection, of(1, 1, 1), {}, found, work));
   for (const std::size_t part : kPresentPart) {
     for (const double log_p : found[part]) EXPECT_EQ(log_p, 0.0);
