@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
+#include <iterator>
 #include <set>
 #include <utility>
 
@@ -140,6 +141,17 @@ Status check_map(const VoxelImage& map, const AnatomyConfig& wanted, const std::
         fmt::format("{}: does not tell the cortex of the left hemisphere from that of the right, "
                     "which falx and tentorium need (anatomy.septa: off leaves them out)",
                     what));
+  }
+  std::set<int> strange;
+  std::copy_if(labels.begin(), labels.end(), std::inserter(strange, strange.end()),
+               [&](int label) { return label != 0 && structure_of(label) == Structure::kOther; });
+  if (!strange.empty()) {
+    VoxelImage others = map;
+    for (float& v : others.values) v = strange.count(whole(v)) != 0 ? v : 0.0F;
+    add_note(notes,
+             fmt::format("{}: not of the brain by anatomy.numbers = {}: {}; where the brain "
+                         "is, the nearest part takes their place",
+                         what, word_of(wanted.numbers, kNumbersWords), listed_labels(others)));
   }
   const std::pair<bool, std::pair<Structure, const char*>> absent[] = {
       {wanted.septa || wanted.tissues, {Structure::kCerebellum, "cerebellum"}},

@@ -334,25 +334,28 @@ Result<ImageRegistrar> ImageRegistrar::create(const VoxelImage& mri, const Voxel
   return registrar;
 }
 
-Result<ImageRegistration> ImageRegistrar::align(const IntensitySamples& samples) const {
+Result<ImageRegistration> ImageRegistrar::follow(const IntensitySamples& samples,
+                                                 const std::vector<RigidTransform>& starts,
+                                                 std::size_t first_level) const {
   if (Status ok = check_samples(samples); !ok) return tl::unexpected(ok.error());
   const auto task = make_task(samples, options_);
   if (!task) return tl::unexpected(task.error());
 
   ImageRegistration result;
   std::vector<Path> paths;
-  for (const RigidTransform& start : starting_poses(options_)) {
+  for (const RigidTransform& start : starts) {
     paths.emplace_back();
     paths.back().end.T = start;
   }
-  for (std::size_t i = 0; i < levels_.size(); ++i) {
+  for (std::size_t i = first_level; i < levels_.size(); ++i) {
     auto level =
         Level::create(levels_[i], region_ ? &*region_ : nullptr, options_.levels[i], *task);
     if (!level) return tl::unexpected(level.error());
     climb_all(*level, paths, result.evaluations);
     merge(*task, paths);
     // The finest level costs most: only the best goes there.
-    if (i + 2 == levels_.size() || levels_.size() == 1) result.agreement = keep_best(*task, paths);
+    if (i + 2 == levels_.size() || first_level + 1 == levels_.size())
+      result.agreement = keep_best(*task, paths);
     if (i + 1 < levels_.size()) continue;
     const PoseAscent& end = paths.front().end;
     result.T_ras_ras = end.T;
@@ -367,6 +370,71 @@ Result<ImageRegistration> ImageRegistrar::align(const IntensitySamples& samples)
   result.rotation_deg = task->rotation_deg(result.T_ras_ras);
   if (Status ok = check_end(*task, result); !ok) return tl::unexpected(ok.error());
   return result;
+}
+
+Result<ImageRegistration> ImageRegistrar::align(const IntensitySamples& samples) const {
+  return follow(samples, starting_poses(options_), 0);
+}
+
+Result<ImageRegistration> ImageRegistrar::refine(const IntensitySamples& samples) const {
+  return follow(samples, {RigidTransform::Identity()}, levels_.size() - 1);
+}
+
+Result<PoseInformation> ImageRegistrar::information(const IntensitySamples& samples) const {
+  if (Status ok = check_samples(samples); !ok) return tl::unexpected(ok.error());
+  const auto task = make_task(samples, options_);
+  if (!task) return tl::unexpected(task.error());
+  auto level =
+      Level::create(levels_.back(), region_ ? &*region_ : nullptr, options_.levels.back(), *task);
+  if (!level) return tl::unexpected(level.error());
+  PoseInformation information;
+  information.centre = task->centre;
+  information.radius_mm = task->radius_mm;
+  Vec6 scale;  // xi = scale * z
+  scale << Vec3::Constant(1.0 / task->radius_mm), Vec3::Ones();
+  const auto gradient = [&](const Vec6& z) -> Vec6 {
+    const RigidTransform T = rigid_increment(scale.cwiseProduct(z), task->centre);
+    return -scale.cwiseProduct(level->similarity(T).gradient);
+  };
+  information.gradient = gradient(Vec6::Zero());
+  Mat6 hessian;
+  for (int k = 0; k < 6; ++k) {
+    const Vec6 step = kCurvatureStep_mm * Vec6::Unit(k);
+    hessian.col(k) = (gradient(step) - gradient(-step)) / (2.0 * kCurvatureStep_mm);
+  }
+  information.hessian = 0.5 * (hessian + hessian.transpose());
+  return information;
+}
+
+Result<std::vector<RigidTransform>> ImageRegistrar::poses_without_parts(
+    const IntensitySamples& samples, int parts) const {
+  if (Status ok = check_samples(samples); !ok) return tl::unexpected(ok.error());
+  const Eigen::Index count = samples.positions.cols();
+  std::vector<RigidTransform> poses;
+  for (int part = 0; part < parts; ++part) {
+    const Eigen::Index from = part * count / parts, to = (part + 1) * count / parts;
+    const Eigen::Index after = count - to;
+    IntensitySamples others;
+    others.positions.resize(3, from + after);
+    others.intensities.resize(from + after);
+    others.positions << samples.positions.leftCols(from), samples.positions.rightCols(after);
+    others.intensities << samples.intensities.head(from), samples.intensities.tail(after);
+    const auto found = refine(others);
+    if (!found)
+      return fail(found.error().code,
+                  fmt::format("without part {} of {}: {}", part + 1, parts, found.error().message));
+    poses.push_back(found->T_ras_ras);
+  }
+  return poses;
+}
+
+double jackknife_error_mm(const std::vector<RigidTransform>& poses, const Vec3& x) {
+  const auto count = static_cast<double>(poses.size());
+  Vec3 mean = Vec3::Zero();
+  for (const RigidTransform& T : poses) mean += T * x / count;
+  double sum = 0.0;
+  for (const RigidTransform& T : poses) sum += (T * x - mean).squaredNorm();
+  return std::sqrt((count - 1.0) / count * sum);
 }
 
 }  // namespace brainshift::registration

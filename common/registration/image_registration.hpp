@@ -128,12 +128,41 @@ class ImageRegistrar {
   // kNotFinite: names the sample. kEmptySet: too few samples inside the MRI. kNotConverged: the
   // best pose lies at the edge of the search.
   Result<ImageRegistration> align(const IntensitySamples& samples) const;
+  // From the given pose alone, on the finest level: where a pose is nearly known. Errors as above.
+  Result<ImageRegistration> refine(const IntensitySamples& samples) const;
+
+  // The samples' centroid, and what their NMI on the finest level tells about a motion from where
+  // they are placed now: hessian = - d^2 NMI / dz^2 and gradient = - d NMI / dz,
+  // z = (radius w, t), by central differences of the exact gradient, kCurvatureStep_mm to either
+  // side. Their unit is that of NMI per mm^2 and per mm, so that only ratios say something. Errors
+  // as above.
+  Result<PoseInformation> information(const IntensitySamples& samples) const;
+  static constexpr double kCurvatureStep_mm = 0.5;
+
+  // The poses, as align gives them, of the samples without one part each: part p of n holds the
+  // samples [p m / n, (p + 1) m / n) of m. The samples are placed at the pose of all. Errors as
+  // above; the sentence names the part. Precondition: parts >= 2.
+  Result<std::vector<RigidTransform>> poses_without_parts(const IntensitySamples& samples,
+                                                          int parts) const;
 
  private:
+  Result<ImageRegistration> follow(const IntensitySamples& samples,
+                                   const std::vector<RigidTransform>& starts,
+                                   std::size_t first_level) const;
   ImageRegistrar() = default;
   ImageRegistrationOptions options_;
   std::vector<VoxelImage> levels_;
   std::optional<VoxelImage> region_;
 };
+
+// How far the pose of all samples puts a point wrong, mm, rms, from the poses without one of n
+// parts each (delete-a-group jackknife):
+//
+//   e(x)^2 = (n - 1) / n  sum_p |T_p x - mean_q T_q x|^2
+//
+// Assumption: the parts err independently. What they share (calibration, speed of sound, tissue
+// that moved) is not in it. Precondition: at least two poses.
+// Source: Efron & Tibshirani, An Introduction to the Bootstrap (1993), ch. 11.
+double jackknife_error_mm(const std::vector<RigidTransform>& poses, const Vec3& x);
 
 }  // namespace brainshift::registration

@@ -151,6 +151,24 @@ def test_a_far_boundary_exits_two_with_the_distance(folder, options):
                    **{"--registration": write(folder / "far.txt", matrix_text(far))})
 
 
+def test_a_registration_is_from_fiducials_or_from_ultrasound(folder, options):
+    shared = ("register", "--target", "1", "2", "3", "--out", folder / "T.txt")
+    ultrasound = (*shared, "--ultrasound", options["--recording"])
+    for words, says in (
+            ((*ultrasound, "--ras", "a.csv"), "--ras is for fiducials"),
+            ((*ultrasound, "--still-s", "2"), "--still-s is for fiducials"),
+            ((*shared, "--fiducials", "f.csv", "--mri", "t1.nii"), "--mri is for --ultrasound"),
+            (ultrasound, "--mri is required with --ultrasound"),
+            ((*ultrasound, "--mri", "t1.nii"), "--registration is required with --ultrasound"),
+            ((*ultrasound, "--picture", folder / "no" / "T.png"), "--picture"),
+    ):
+        refused(brainshift(*words), says)
+        assert not (folder / "T.txt").exists()
+    shown = good(brainshift("register", "--help")).stdout
+    for part in ("From fiducials", "From ultrasound, before the dura is opened", "--ultrasound", "brainshift import"):
+        assert part in shown
+
+
 def test_help_of_import_teaches():
     shown = good(brainshift("import", "--help")).stdout
     for part in ("Example:", "--recording", "--registration", "--seeds", "brainshift replay"):

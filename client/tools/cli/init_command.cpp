@@ -31,10 +31,10 @@ void add_init(CLI::App& app, Status& status) {
                       "of a *_dseg.tsv beside it: brain and brainstem are taken from it");
   command->add_option("--brain", options->brain, "brain mask or skull-stripped MRI");
   command->add_option("--tumour", options->tumour,
-                      "segmentation (NIfTI, .mgz, .nrrd, .seg.nrrd, DICOM SEG)");
+                      "segmentation (NIfTI, .mgz, .nrrd, .seg.nrrd, DICOM SEG or RTSTRUCT)");
   command->add_option("--tumour-label", options->tumour_label,
                       "the tumour's labels, where there are several: numbers or names of a "
-                      "*_dseg.tsv beside it (of a SEG's segments), separated by commas");
+                      "*_dseg.tsv beside it (of DICOM's segments or structures), between commas");
   command->add_option("--tumour-segment", options->tumour_segment,
                       "the tumour's segment in a .seg.nrrd");
   command->add_option(

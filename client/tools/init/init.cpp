@@ -21,6 +21,8 @@
 #include "common/io/config/config_file.hpp"
 #include "common/io/dicom/dicom_segmentation.hpp"
 #include "common/io/dicom/dicom_series.hpp"
+#include "common/io/dicom/dicom_structures.hpp"
+#include "common/io/dicom/filled_contours.hpp"
 #include "common/io/fields/field_files.hpp"
 #include "common/io/files/csv_numbers.hpp"
 #include "common/io/files/file_access.hpp"
@@ -107,9 +109,14 @@ Result<TumourChoice> named_labels(const InitOptions& options, const io::LabelNam
     double number = 0.0;
     const bool whole =
         io::parse_number(word, number) && number == std::round(number) && std::abs(number) < 1e9;
-    auto found = std::find_if(names.begin(), names.end(), [&](const auto& name) {
+    const auto is_it = [&](const auto& name) {
       return io::lower_case(name.second) == io::lower_case(word);
-    });
+    };
+    const auto found = std::find_if(names.begin(), names.end(), is_it);
+    if (const auto times = std::count_if(names.begin(), names.end(), is_it); !whole && times > 1) {
+      return invalid(fmt::format("--tumour-label: {}: {} has {} of this name: give the number",
+                                 in_quotes(word), options.tumour.string(), times));
+    }
     if (!whole && found == names.end()) {
       std::string known;
       for (const auto& [label, name] : names) {
@@ -172,6 +179,65 @@ Result<TumourChoice> tumour_segments(const InitOptions& options, const io::Dicom
   return choice;
 }
 
+// Number, name and volume of each structure, or why it has none.
+std::string listed_structures(const io::DicomStructures& set, const VoxelImage& grid) {
+  std::string list;
+  for (const io::DicomStructure& one : set.structures) {
+    const auto mm3 = one.defect.empty() ? io::contours_volume_mm3(one.contours, grid)
+                                        : Result<double>(invalid(one.defect));
+    list += fmt::format("{}{} {} ({})", list.empty() ? "" : ", ", one.number, in_quotes(one.name),
+                        mm3 ? fmt::format("{:.2f} cc", *mm3 / kMm3PerCc) : mm3.error().message);
+  }
+  return list;
+}
+
+// Of a DICOM structure set: the only structure, or those that were named. grid: that of the MRI.
+Result<TumourChoice> tumour_structures(const InitOptions& options, const io::DicomStructures& set,
+                                       const VoxelImage& grid) {
+  if (options.tumour_label.empty() && set.structures.size() == 1) {
+    return TumourChoice{{set.structures.front().number}, "the only structure"};
+  }
+  if (options.tumour_label.empty()) {
+    return invalid(
+        fmt::format("{}: has several structures; name the tumour's by --tumour-label: {}",
+                    options.tumour.string(), listed_structures(set, grid)));
+  }
+  io::LabelNames names;
+  for (const io::DicomStructure& one : set.structures) names[one.number] = one.name;
+  auto choice = named_labels(options, names);
+  for (const int number : choice ? choice->labels : std::vector<int>()) {
+    if (names.count(number) != 0) continue;
+    return invalid(fmt::format("--tumour-label: {}: {} has no such structure; it has {}", number,
+                               options.tumour.string(), listed_structures(set, grid)));
+  }
+  return choice;
+}
+
+// The structures as labels by their numbers on the grid; where several lie, the last one chosen.
+Result<VoxelImage> structure_map(const io::DicomStructures& set, const std::vector<int>& numbers,
+                                 const VoxelImage& grid, std::vector<std::string>& notes) {
+  VoxelImage map;
+  map.dims = grid.dims, map.T_ras_voxel = grid.T_ras_voxel;
+  map.values.assign(grid.num_voxels(), 0.0F);
+  for (const int number : numbers) {
+    const auto one = std::find_if(set.structures.begin(), set.structures.end(),
+                                  [&](const auto& other) { return other.number == number; });
+    const std::string name = fmt::format("structure {} {}", number, in_quotes(one->name));
+    if (!one->defect.empty()) {
+      return invalid(fmt::format("{}: {}: closed planar contours are needed", name, one->defect));
+    }
+    const auto filled = io::fill_contours(one->contours, grid);
+    if (!filled) return fail(filled.error().code, name + ": " + filled.error().message);
+    for (std::size_t v = 0; v < map.values.size(); ++v) {
+      if (filled->mask.values[v] > 0.0F) map.values[v] = static_cast<float>(number);
+    }
+    notes.push_back(fmt::format("{}, from {} contours in {} planes {:.2f} mm apart", name,
+                                one->contours.size(), filled->planes, filled->spacing_mm));
+    for (const std::string& note : filled->notes) notes.push_back(note);
+  }
+  return map;
+}
+
 // ---- the case as text ----
 
 std::string list_text(const Vec3& x, int digits) {
@@ -208,8 +274,9 @@ struct Draft {
   InitOptions options;
   fs::path mri, brain, tumour_file;
   TumourChoice tumour;
-  std::optional<VoxelImage> series;    // of a DICOM MRI
-  std::optional<VoxelImage> segments;  // of a DICOM segmentation
+  std::optional<io::DicomSeries> series;  // of a DICOM MRI
+  VoxelImage grid;                        // of the MRI, without values
+  std::optional<VoxelImage> segments;     // of a DICOM segmentation or structure set
   std::string about_mri, about_brain, about_tumour, about_opening, about_stem, about_gravity;
   double opening_mm = 0.0;
   OpeningGuess opening;
@@ -295,16 +362,58 @@ std::string about_series(const io::DicomSeries& series) {
   return text + ".";
 }
 
+// A tumour from DICOM, and what to say of it.
+struct DicomTumour {
+  VoxelImage map;
+  TumourChoice choice;
+  std::vector<std::string> notes;
+};
+
+Result<DicomTumour> tumour_of_structures(const Draft& draft) {
+  const fs::path& file = draft.options.tumour;
+  const auto set = io::read_dicom_structures(file);
+  if (!set) return tl::unexpected(set.error());
+  DicomTumour tumour;
+  if (draft.series && !set->frame_of_reference.empty() &&
+      !draft.series->frame_of_reference.empty() &&
+      set->frame_of_reference != draft.series->frame_of_reference) {
+    return invalid(file.string() +
+                   ": was drawn in another frame of reference (0020,0052) than --mri: its places "
+                   "are not those of this MRI");
+  }
+  auto choice = tumour_structures(draft.options, *set, draft.grid);
+  if (!choice) return tl::unexpected(choice.error());
+  tumour.choice = std::move(*choice);
+  auto map = structure_map(*set, tumour.choice.labels, draft.grid, tumour.notes);
+  if (!map) return io::file_error(file, map.error());
+  if (draft.series && !set->series.empty() && set->series != draft.series->series) {
+    tumour.notes.emplace_back("drawn on another series in the MRI's frame of reference");
+  }
+  tumour.map = std::move(*map);
+  return tumour;
+}
+
+Result<DicomTumour> tumour_of_segments(const Draft& draft) {
+  const auto seg = io::read_dicom_segmentation(draft.options.tumour);
+  if (!seg) return tl::unexpected(seg.error());
+  auto choice = tumour_segments(draft.options, *seg);
+  if (!choice) return tl::unexpected(choice.error());
+  return DicomTumour{io::label_map(*seg, choice->labels), std::move(*choice), {}};
+}
+
 Status guess_tumour(Draft& draft, const VoxelImage& brain) {
   const InitOptions& options = draft.options;
+  std::vector<std::string> about;
   Result<VoxelImage> image = VoxelImage();
   Result<TumourChoice> choice = TumourChoice();
   if (io::is_dicom(options.tumour)) {
-    const auto seg = io::read_dicom_segmentation(options.tumour);
-    if (!seg) return tl::unexpected(seg.error());
-    choice = tumour_segments(options, *seg);
-    if (choice) image = io::label_map(*seg, choice->labels), draft.segments = *image;
+    auto tumour = io::is_dicom_structures(options.tumour) ? tumour_of_structures(draft)
+                                                          : tumour_of_segments(draft);
+    if (!tumour) return tl::unexpected(tumour.error());
     draft.tumour_file = beside(options.out, "-tumour.nii.gz");
+    draft.segments = tumour->map;
+    image = std::move(tumour->map), choice = std::move(tumour->choice);
+    about = std::move(tumour->notes);
   } else {
     image = io::read_label_map(options.tumour, {options.tumour_segment, 1});
     if (image) choice = tumour_labels(options, *image);
@@ -320,6 +429,7 @@ Status guess_tumour(Draft& draft, const VoxelImage& brain) {
   for (const anatomy::Focus& focus : *foci) mm3 += focus.volume_mm3;
   draft.about_tumour = fmt::format("{:.2f} cc ({}).", mm3 / kMm3PerCc,
                                    options.tumour_segment.empty() ? choice->why : "the segment");
+  for (const std::string& note : about) draft.about_tumour += " " + note + ".";
   for (const std::string& note : notes) {
     draft.about_tumour += " " + note.substr(options.tumour.string().size() + 2) + ".";
   }
@@ -348,14 +458,18 @@ Status take_mri(Draft& draft) {
     if (!read) return tl::unexpected(read.error());
     draft.mri = beside(options.out, "-mri.nii.gz");
     draft.about_mri = about_series(*read);
-    draft.series = std::move(read->image);
+    draft.series = std::move(*read);
+    draft.grid.dims = draft.series->image.dims;
+    draft.grid.T_ras_voxel = draft.series->image.T_ras_voxel;
     return {};
   }
   if (io::lower_extension(options.mri) == ".dcm") {
     return invalid("--mri: " + options.mri.string() +
                    ": is one image of a DICOM series: give the folder that holds the series");
   }
-  if (const auto mri = io::read_volume(options.mri); !mri) return tl::unexpected(mri.error());
+  const auto mri = io::read_volume(options.mri);
+  if (!mri) return tl::unexpected(mri.error());
+  draft.grid.dims = mri->dims, draft.grid.T_ras_voxel = mri->T_ras_voxel;
   return {};
 }
 
@@ -417,8 +531,8 @@ Result<std::vector<fs::path>> write_files(const Draft& draft, const VoxelImage& 
     return io::write_nifti(path, {{image.dims, image.T_ras_voxel}, image.values, note});
   };
   Status ok;
-  if (draft.series) ok = write(draft.mri, *draft.series, "from DICOM");
-  if (ok && draft.segments) ok = write(draft.tumour_file, *draft.segments, "from DICOM SEG");
+  if (draft.series) ok = write(draft.mri, draft.series->image, "from DICOM");
+  if (ok && draft.segments) ok = write(draft.tumour_file, *draft.segments, "from DICOM");
   if (ok && options.brain.empty()) ok = write(draft.brain, brain, "brain mask");
   if (ok) ok = io::write_file(options.out, text);
   if (!ok) return tl::unexpected(ok.error());

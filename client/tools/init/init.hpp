@@ -10,7 +10,8 @@
 //   gravity     position.hpp
 // An MRI that is a folder is a DICOM series (io/dicom); it is written beside the case as
 // NAME-mri.nii.gz. So is a tumour from a DICOM segmentation, as NAME-tumour.nii.gz, whose labels
-// are the segments' numbers.
+// are the segments' numbers, or from a DICOM structure set (RTSTRUCT), whose contours are filled on
+// the MRI's grid and whose labels are the structures' numbers.
 #pragma once
 
 #include <filesystem>
@@ -28,7 +29,7 @@ struct InitOptions {
   std::filesystem::path labels;     // FreeSurfer's numbers, or names in a *_dseg.tsv beside it
   std::filesystem::path brain;      // a mask
   std::filesystem::path tumour;     // a label map or segmentation
-  std::string tumour_label = {};    // numbers, or names of a *_dseg.tsv or a SEG's, between commas
+  std::string tumour_label = {};    // numbers, or names of a *_dseg.tsv or of DICOM
   std::string tumour_segment = {};  // of a .seg.nrrd
   std::string position;
   std::filesystem::path out;  // its name without extension names the case
@@ -42,8 +43,8 @@ struct InitSummary {
 // Writes the case, which io::read_case_config reads. kInvalidArgument: options that are missing
 // (all of them in one sentence), a case that is there already, a position, labels that the
 // tumour's map does not have (those that it has are listed), several labels and none chosen where
-// they are not BraTS's (1, 2 and 3 or 4: then all but 2, oedema). Errors of the readers;
-// kWriteFailed.
+// they are not BraTS's (1, 2 and 3 or 4: then all but 2, oedema), a structure set of another frame
+// of reference than the series. Errors of the readers and of io::fill_contours; kWriteFailed.
 Result<InitSummary> write_first_case(const InitOptions& options);
 
 // As above. outward: the direction in which the place is outermost; unit.

@@ -26,7 +26,7 @@ constexpr int kMaxDicomVoxelsAlong = 32767;
 
 struct Slice {
   fs::path file;
-  std::string series, description, patient_position;
+  std::string series, frame_of_reference, description, patient_position;
   std::array<int, 2> size{};  // columns, rows
   ImagePlane plane;
   std::vector<float> values;
@@ -114,6 +114,7 @@ Result<std::unique_ptr<Slice>> read_slice(const fs::path& file) {
   auto slice = std::make_unique<Slice>();
   slice->file = file;
   slice->series = text_of(data, DCM_SeriesInstanceUID);
+  slice->frame_of_reference = text_of(data, DCM_FrameOfReferenceUID);
   slice->description = to_utf8(text_of(data, DCM_SeriesDescription));
   slice->patient_position = text_of(data, DCM_PatientPosition);
   const auto plane = image_plane(data, data, data);
@@ -197,6 +198,7 @@ Result<DicomSeries> join(std::vector<Slice>& slices) {
   const Slice& first = slices.front();
   DicomSeries series;
   series.description = first.description;
+  series.series = first.series, series.frame_of_reference = first.frame_of_reference;
   series.patient_position = first.patient_position;
   VoxelImage& image = series.image;
   image.dims = {first.size[0], first.size[1], static_cast<int>(slices.size())};

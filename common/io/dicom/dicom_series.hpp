@@ -20,7 +20,8 @@ namespace brainshift::io {
 
 struct DicomSeries {
   VoxelImage image;
-  std::string description;       // (0008,103e)
+  std::string description;                 // (0008,103e)
+  std::string frame_of_reference, series;  // UIDs; empty: not said
   std::string patient_position;  // (0018,5100) in the scanner: HFS, HFP, ...; empty: not said
   int other_files = 0;           // of the folder: no DICOM, or DICOM without an image
 };

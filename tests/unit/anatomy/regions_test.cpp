@@ -221,6 +221,46 @@ TEST(Regions, AMapWithoutVentriclesIsTold) {
   EXPECT_THAT(notes, ::testing::Contains(HasSubstr("has no label of the ventricles")));
 }
 
+TEST(Regions, LabelsThatNobodyKnowsAreToldWithTheirSizesAndTheFile) {
+  CaseInputs inputs = labelled_case();
+  std::size_t v = 0;
+  for (int k = 0; k < inputs.labels->dims[2]; ++k)
+    for (int j = 0; j < inputs.labels->dims[1]; ++j)
+      for (int i = 0; i < inputs.labels->dims[0]; ++i, ++v) {
+        const Vec3 x = inputs.labels->T_ras_voxel * Vec3(i, j, k) - kBallCentre;
+        if ((x - Vec3(0, 30, 10)).norm() < 6.0) inputs.labels->values[v] = 507.0F;
+      }
+  EXPECT_THAT(head_of(inputs).notes,
+              ::testing::Contains(::testing::AllOf(
+                  HasSubstr("anatomy.labels = 'labels.nii': not of the brain by anatomy.numbers = "
+                            "freesurfer: 507 ("),
+                  HasSubstr(" cc); where the brain is"))));
+  for (const std::string& note : shared_head().notes)
+    EXPECT_THAT(note, ::testing::Not(HasSubstr("not of the brain")));
+}
+
+// A horn as wide as the ventricle, to the surface: a cavity must not open it.
+TEST(Regions, VentriclesThatTouchTheSurfaceStayBrainThereAndAreTold) {
+  CaseInputs inputs = labelled_case();
+  std::size_t v = 0;
+  for (int k = 0; k < inputs.labels->dims[2]; ++k)
+    for (int j = 0; j < inputs.labels->dims[1]; ++j)
+      for (int i = 0; i < inputs.labels->dims[0]; ++i, ++v) {
+        const Vec3 x = inputs.labels->T_ras_voxel * Vec3(i, j, k) - kBallCentre;
+        float& label = inputs.labels->values[v];
+        if (label > 0.0F && x[1] > 0.0 && std::hypot(x[0], x[2]) < kVentricle_mm) label = 4.0F;
+      }
+  const LabelledHead head = head_of(inputs);
+  EXPECT_THAT(head.notes,
+              ::testing::Contains(::testing::AllOf(HasSubstr("anatomy.labels = 'labels.nii': of "),
+                                                   HasSubstr(" cc touch the brain's surface and "),
+                                                   HasSubstr("they are brain"))));
+  EXPECT_TRUE(geometry::is_closed({head.model.mesh.nodes, head.model.ventricle_wall}));
+  EXPECT_NEAR(geometry::enclosed_volume({head.model.mesh.nodes, head.model.boundary_triangles}),
+              geometry::balls::ball_volume(kBallRadius_mm),
+              0.03 * geometry::balls::ball_volume(kBallRadius_mm));
+}
+
 TEST(Regions, AalNumbersAreThoseOfTheSameStructures) {
   VoxelImage map;
   map.dims = {8, 1, 1};

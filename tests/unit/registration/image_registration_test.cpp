@@ -215,6 +215,79 @@ TEST(ImageRegistration, LowAgreementTellsUnrelatedImages) {
   }
 }
 
+TEST(ImageRegistration, RefiningGoesOnFromAPoseNearby) {
+  const RigidTransform T_error(Eigen::Translation3d(0.6, -0.5, 0.4));
+  IntensitySamples displaced = samples();
+  displaced.positions = test::moved(T_error, displaced.positions);
+  const auto result = value_or_fail(registrar().refine(displaced));
+  EXPECT_LT(error_mm(result.T_ras_ras, T_error), 0.1);
+  EXPECT_EQ(result.agreement, 1.0);
+  EXPECT_GT(result.nmi_after, result.nmi_before);
+}
+
+// An image that changes along R alone shows neither a turn about R nor motions along A and S.
+TEST(ImageRegistration, InformationTellsWhatALayeredImageDoesNotShow) {
+  VoxelImage layers = mri();
+  layers.T_ras_voxel.linear() = 1.5 * Mat3::Identity();
+  layers.T_ras_voxel.translation() = Vec3::Constant(-48.0);
+  const auto value = [](const Vec3& x) { return std::sin(0.25 * x[0]) + 0.02 * x[0]; };
+  for (int k = 0, voxel = 0; k < 65; ++k)
+    for (int j = 0; j < 65; ++j)
+      for (int i = 0; i < 65; ++i, ++voxel)
+        layers.values[static_cast<std::size_t>(voxel)] =
+            static_cast<float>(value(layers.T_ras_voxel * Vec3(i, j, k)));
+  IntensitySamples seen = samples();
+  for (Eigen::Index i = 0; i < seen.positions.cols(); ++i)
+    seen.intensities[i] = value(seen.positions.col(i));
+  const auto layered =
+      value_or_fail(value_or_fail(ImageRegistrar::create(layers, nullptr)).information(seen));
+  const Observability axes = observability(layered, 1e-2);
+  EXPECT_FALSE(axes.rotation_shown(0));
+  EXPECT_TRUE(axes.rotation_shown(1) && axes.rotation_shown(2));
+  EXPECT_GT(std::abs(axes.rotation_axes(0, 0)), 0.99);
+  EXPECT_FALSE(axes.translation_shown(0) || axes.translation_shown(1));
+  EXPECT_TRUE(axes.translation_shown(2));
+  EXPECT_GT(std::abs(axes.translation_axes(0, 2)), 0.99);
+  const auto all = value_or_fail(registrar().information(samples()));
+  EXPECT_TRUE(not_shown(observability(all, 1e-2)).empty());
+  EXPECT_GT(all.hessian(0, 0), 0.0);
+}
+
+// Where a pose is the mean of what its parts say, the jackknife is the mean's standard error.
+TEST(ImageRegistration, TheJackknifeOfAMeanIsItsStandardError) {
+  const std::vector<double> says = {1.0, -2.0, 0.5, 4.0, 1.5};
+  double mean = 0.0, squares = 0.0;
+  for (const double one : says) mean += one / 5.0;
+  for (const double one : says) squares += (one - mean) * (one - mean);
+  std::vector<RigidTransform> poses;
+  for (const double one : says)
+    poses.emplace_back(Eigen::Translation3d(0.0, (5.0 * mean - one) / 4.0, 7.0));
+  ASSERT_GT(squares, 1.0);
+  EXPECT_NEAR(jackknife_error_mm(poses, Vec3(3, 4, 5)), std::sqrt(squares / 4.0 / 5.0), 1e-12);
+}
+
+TEST(ImageRegistration, PosesWithoutPartsTellTheErrorThatSpeckleLeaves) {
+  const ImageRegistrar mri_registrar = registrar();
+  const Vec3 target(5, -8, 6);
+  double squares = 0.0, expected = 0.0;
+  constexpr int kTrials = 6;
+  for (int trial = 0; trial < kTrials; ++trial) {
+    Random random(static_cast<std::uint64_t>(100 + trial));
+    IntensitySamples speckled = samples();
+    for (double& value : speckled.intensities)
+      value *= std::hypot(random.normal(), random.normal());
+    const auto found = value_or_fail(mri_registrar.refine(speckled));
+    squares += (found.T_ras_ras * target - target).squaredNorm() / kTrials;
+    speckled.positions = test::moved(found.T_ras_ras, speckled.positions);
+    const auto poses = value_or_fail(mri_registrar.poses_without_parts(speckled, 8));
+    ASSERT_EQ(poses.size(), 8u);
+    expected += jackknife_error_mm(poses, target) / kTrials;
+  }
+  EXPECT_GT(squares, 0.0);
+  EXPECT_LT(std::sqrt(squares), 2.0 * expected);
+  EXPECT_GT(std::sqrt(squares), 0.5 * expected);
+}
+
 void expect_image_refused(const Result<ImageRegistration>& result, ErrorCode code,
                           const std::string& text) {
   EXPECT_THAT(refusal_of(result, code), HasSubstr(text));
@@ -222,6 +295,11 @@ void expect_image_refused(const Result<ImageRegistration>& result, ErrorCode cod
 
 TEST(ImageRegistration, RefusesBadSamples) {
   const ImageRegistrar mri_registrar = registrar();
+  EXPECT_THAT(refusal_of(mri_registrar.information({}), ErrorCode::kInvalidArgument),
+              HasSubstr("at least 500"));
+  EXPECT_THAT(refusal_of(mri_registrar.poses_without_parts(test::samples_of(blobs(), 700, 1), 2),
+                         ErrorCode::kInvalidArgument),
+              HasSubstr("without part 1 of 2: image registration: 350 samples"));
   expect_image_refused(mri_registrar.align({}), ErrorCode::kInvalidArgument,
                        "0 samples: at least 500");
   expect_image_refused(mri_registrar.align(test::samples_of(blobs(), 499, 1)),

@@ -9,6 +9,7 @@
 #include "common/io/config/config_file.hpp"
 #include "common/io/fields/field_files.hpp"
 #include "common/io/geometry/label_map_file.hpp"
+#include "tests/support/dicom_files.hpp"
 #include "tests/support/results.hpp"
 #include "tests/support/temporary_folder.hpp"
 #include "tests/unit/io/dicom/dicom_bytes.hpp"
@@ -144,6 +145,56 @@ TEST_F(FirstCase, ATumourOfADicomSegmentationIsWrittenBesideTheCase) {
   const VoxelImage map = value_or_fail(io::read_volume(tumour.path));
   EXPECT_EQ(map.at(1, 1, 0), 1.0F);
   EXPECT_LT((map.T_ras_voxel * Vec3(1, 1, 0) - Vec3(4.5, -8, 10)).norm(), 1e-5);
+}
+
+TEST_F(FirstCase, ATumourOfADicomStructureSetIsFilledOnTheGridOfTheMri) {
+  const VoxelImage lesion = drawn(lesion_at);
+  test_support::StructureSet set;
+  set.structures = {{5, "GTV", test_support::outlines(lesion, 1)},
+                    {9, "Oedema", test_support::outlines(lesion, 2)},
+                    {2, "Isocentre", {{Points::Zero(3, 1), "POINT"}}}};
+  const auto write = [&] { test_support::write_structure_set(folder / "rs.dcm", set); };
+  write();
+  options.tumour = folder / "rs.dcm";
+  EXPECT_THAT(refusal(), AllOf(HasSubstr("rs.dcm: has several structures; name the tumour's by "
+                                         "--tumour-label: 5 \"GTV\" (0."),
+                               HasSubstr("9 \"Oedema\" (1"),
+                               HasSubstr("2 \"Isocentre\" (contour 1 is POINT)")));
+  options.tumour_label = "7";
+  EXPECT_THAT(refusal(), HasSubstr("rs.dcm has no such structure; it has 5 \"GTV\""));
+  options.tumour_label = "isocentre";
+  EXPECT_THAT(refusal(), HasSubstr("rs.dcm: structure 2 \"Isocentre\": contour 1 is POINT: closed "
+                                   "planar contours are needed"));
+  options.tumour_label = "gtv";
+  const auto tumour = std::get<TumourLabel>(written().tumour);
+  EXPECT_THAT(tumour.labels, ElementsAre(5));
+  EXPECT_EQ(tumour.path, folder / "case-tumour.nii.gz");
+  EXPECT_THAT(test_support::content_of(options.out),
+              AllOf(HasSubstr("structure 5 \"GTV\", from "), HasSubstr("planes 3.00 mm apart")));
+  const VoxelImage map = value_or_fail(io::read_volume(tumour.path));
+  ASSERT_EQ(map.values.size(), lesion.values.size());
+  for (std::size_t v = 0; v < map.values.size(); ++v)
+    ASSERT_EQ(map.values[v], lesion.values[v] == 1.0F ? 5.0F : 0.0F) << v;
+  options.out = folder / "again.yaml";
+  set.structures[1].name = "gtv";
+  write();
+  EXPECT_THAT(refusal(), HasSubstr("has 2 of this name: give the number"));
+}
+
+TEST_F(FirstCase, AStructureSetOfAnotherFrameOfReferenceIsRefused) {
+  std::filesystem::create_directory(folder / "series");
+  test_support::write_series(folder / "series", value_or_fail(io::read_volume(options.mri)));
+  options.mri = folder / "series", options.tumour = folder / "rs.dcm";
+  test_support::StructureSet set;
+  set.structures = {{1, "GTV", test_support::outlines(drawn(lesion_at), 1)}};
+  set.frame_of_reference = "1.2.3.5";
+  test_support::write_structure_set(options.tumour, set);
+  EXPECT_THAT(refusal(), HasSubstr("rs.dcm: was drawn in another frame of reference"));
+  set.frame_of_reference = "1.2.3.4", set.series = "1.2.77";
+  test_support::write_structure_set(options.tumour, set);
+  written();
+  EXPECT_THAT(test_support::content_of(options.out),
+              AllOf(HasSubstr("drawn on another series"), HasSubstr("(the only structure)")));
 }
 
 TEST(OpeningOver, LiesOnTheOutsideAndNotInAHollow) {
