@@ -151,9 +151,9 @@ def test_a_far_boundary_exits_two_with_the_distance(folder, options):
                    **{"--registration": write(folder / "far.txt", matrix_text(far))})
 
 
-def test_a_registration_is_from_fiducials_or_from_ultrasound(folder, options):
+def test_a_registration_is_from_fiducials_or_from_ultrasound(folder):
     shared = ("register", "--target", "1", "2", "3", "--out", folder / "T.txt")
-    ultrasound = (*shared, "--ultrasound", options["--recording"])
+    ultrasound = (*shared, "--ultrasound", folder / "us.mha")
     for words, says in (
             ((*ultrasound, "--ras", "a.csv"), "--ras is for fiducials"),
             ((*ultrasound, "--still-s", "2"), "--still-s is for fiducials"),
