@@ -20,15 +20,15 @@
 namespace brainshift::outside {
 namespace {
 
-// The toy patient, open between x < 30 and x > 30 mm above z = 40 mm, with a cavity of 20 x 20 x 10
-// mm about (30, 30, 15).
+// The toy patient, open between x < 30 and x > 30 mm above z = 40 mm, with a cavity of 20 x 20 x 20
+// mm about (30, 30, 20).
 BrainModel box_with_anatomy() {
   BrainModel toy = test_support::toy_patient(6);
   const TetMesh mesh = toy.mesh;
   std::vector<char> taken;
   for (int t = 0; t < mesh.num_tets(); ++t) {
     const Vec3 x = mesh.nodes(Eigen::all, mesh.tets.col(t)).rowwise().mean();
-    taken.push_back((x - Vec3(30, 30, 15)).cwiseAbs().cwiseQuotient(Vec3(10, 10, 5)).maxCoeff() <
+    taken.push_back((x - Vec3(30, 30, 20)).cwiseAbs().cwiseQuotient(Vec3(10, 10, 10)).maxCoeff() <
                     1);
   }
   std::set<std::array<int, 3>> facets;
@@ -69,13 +69,13 @@ OutsideTruths& box_truths() {
   return *made;
 }
 
-constexpr double kCavity_mm3 = 20.0 * 20.0 * 10.0;
+constexpr double kCavity_mm3 = 20.0 * 20.0 * 20.0;
 
 TEST(Cavity, ItsVolumeFollowsTheWall) {
   for (const auto element : {fem::Element::kP1, fem::Element::kP2}) {
     const fem::DisplacementSpace space = fem::make_space(box_head().mesh, element);
     const Points rest = Points::Zero(3, space.num_nodes());
-    const Points shrunk = (space.nodes.colwise() - Vec3(30, 30, 15)) * -0.1;
+    const Points shrunk = (space.nodes.colwise() - Vec3(30, 30, 20)) * -0.1;
     const Wall& wall = box_head().ventricle_wall;
     EXPECT_NEAR(cavity_volume(space, rest, wall), kCavity_mm3, 1e-8);
     EXPECT_NEAR(cavity_volume(space, shrunk, wall), kCavity_mm3 * 0.729, 1e-8);
@@ -92,7 +92,7 @@ TEST(Cavity, SuctionDoesTheWorkOfTheVolume) {
   const fem::DisplacementSpace space = fem::make_space(box_head().mesh, fem::Element::kP2);
   const Points load = suction_load(space, box_head().ventricle_wall, {}, 2.0);
   EXPECT_LT(load.rowwise().sum().norm(), 1e-9);
-  const Points little = (space.nodes.colwise() - Vec3(30, 30, 15)) * -1e-3;
+  const Points little = (space.nodes.colwise() - Vec3(30, 30, 20)) * -1e-3;
   EXPECT_NEAR(load.cwiseProduct(little).sum(), 2.0 * 3e-3 * kCavity_mm3, 1e-6);
   const Points half = suction_load(space, box_head().ventricle_wall, {30.0, 1.0}, 2.0);
   for (int i = 0; i < space.num_nodes(); ++i) {
@@ -133,6 +133,16 @@ TEST(HeadsWithAnatomy, SheetsHoldBothSides) {
   EXPECT_LE(most, 1.2 + 1e-7);
   EXPECT_GE(most, 0.2);
   EXPECT_GT(unheld, 2.0);
+}
+
+// The middle of the cavity is a node of the mesh without one.
+TEST(HeadsWithAnatomy, AMeshWithoutTheirCavitiesIsOfTheSameHead) {
+  const auto other = client::make_other_mesh(test_support::toy_patient(6), box_head());
+  ASSERT_TRUE(other) << other.error().message;
+  EXPECT_NEAR((*other)->nodes.farthest_outside_mm(), 10.0, 1e-9);
+  BrainModel shifted = test_support::toy_patient(6);
+  shifted.mesh.nodes.row(0).array() += 6.0;
+  EXPECT_FALSE(client::make_other_mesh(shifted, box_head()));
 }
 
 TEST(HeadsWithAnatomy, NodesOfASheetAreLocatedOnTheirSide) {
