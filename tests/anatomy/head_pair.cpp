@@ -21,17 +21,20 @@
 #include "tests/surgeries/surgery_place.hpp"
 
 namespace brainshift::anatomy_study {
-namespace {
 
 using surgeries::Cells;
 using surgeries::Row;
+
+namespace {
 
 constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
 constexpr CommonPlaces::Means kNoMeans{kNaN, kNaN, kNaN};
 constexpr double kNoDeadline_ms = 600000.0;
 constexpr std::uint64_t kPlaceSeed = 42;
 
-// What one update of one model is worth. NaN: not measured.
+}  // namespace
+
+// NaN: not measured.
 struct ModelScore {
   std::string status = "refused";
   CommonPlaces::Means field_mm = kNoMeans;
@@ -40,6 +43,8 @@ struct ModelScore {
   std::optional<surgeries::UpdateScore> nodes;
   std::string quality;
 };
+
+namespace {
 
 struct TruthFacts {
   CommonPlaces::Means motion_mm = kNoMeans;
@@ -230,6 +235,52 @@ std::string HeadPair::told() const {
       open_->places.size(), plain_->places.size(), open_->removed_without.size());
 }
 
+Result<std::vector<ModelScore>> HeadPair::estimates(const Model& model, const World& world,
+                                                    bool anatomy, const StudyKind& kind,
+                                                    const outside::OutsideTruth& truth,
+                                                    std::uint64_t seed) {
+  const fem::DisplacementSpace& space = world.head().space();
+  const auto& points = anatomy ? world.nodes_with : world.nodes_without;
+  auto surgery = client::play_given(model.brain(), model.head.config,
+                                    *client::find_scenario(surgeries::kSeenBy),
+                                    points.displacement(space, truth.quadratic), seed);
+  if (!surgery) return tl::unexpected(surgery.error());
+  for (io::SurgeryTruth& each : surgery->truths) {
+    for (const NodeIndex node : anatomy ? world.removed_with : world.removed_without) {
+      each.points["removed"].push_back(
+          {Eigen::Vector4i::Constant(node), Eigen::Vector4d(1, 0, 0, 0)});
+    }
+  }
+  const auto errors = [&](const Points& nodal) {
+    return anatomy ? world.places.error_with(space, truth.quadratic, nodal)
+                   : world.places.error_without(space, truth.quadratic, nodal);
+  };
+  const double loaded_mm =
+      kind.any_mesh ? error_under_the_true_load(model.head, truth,
+                                                [&](const Points& u) { return errors(u).all; })
+                    : kNaN;
+  model.pipeline->reset();
+  std::vector<ModelScore> scores;
+  for (std::size_t i = 0; i < surgery->observations.size(); ++i) {
+    ModelScore& score = scores.emplace_back();
+    score.loaded_mm = loaded_mm;
+    const auto update = model.pipeline->run(surgery->observations[i]);
+    if (!update) continue;
+    const Estimate& estimate = update->estimate;
+    const auto nodes =
+        surgeries::score_update(model.brain(), surgery->truths[i], estimate, static_cast<int>(i));
+    if (!nodes) return tl::unexpected(nodes.error());
+    score.status = std::string(to_string(estimate.status));
+    score.quality = std::string(to_string(estimate.quality.quality));
+    score.nodes = *nodes;
+    score.field_mm = errors(estimate.displacement);
+    score.ventricle_change_mm3 = estimate.ventricle_change_mm3;
+    score.update_ms =
+        update->timings.register_ms + update->timings.invert_ms + update->timings.rebuild_ms;
+  }
+  return scores;
+}
+
 Result<std::vector<Row>> HeadPair::play(const AnatomyKey& key) {
   const StudyKind& kind = *find_study_kind(key.kind);
   World& world = kind.anatomy ? *open_ : *plain_;
@@ -248,54 +299,17 @@ Result<std::vector<Row>> HeadPair::play(const AnatomyKey& key) {
                    truth->pressed,
                    world.places.size()};
   if (wall.cols() > 0) {
+    const Points rest = Points::Zero(3, space.num_nodes());
     facts.change_mm3 = outside::cavity_volume(space, truth->quadratic, wall) -
-                       outside::cavity_volume(space, Points::Zero(3, space.num_nodes()), wall);
+                       outside::cavity_volume(space, rest, wall);
   }
-  const client::Scenario scenario = *client::find_scenario(surgeries::kSeenBy);
-  std::vector<std::vector<ModelScore>> scores;
-  for (const bool anatomy : {true, false}) {
-    const Model& model = anatomy ? *with_ : *without_;
-    const auto& points = anatomy ? world.nodes_with : world.nodes_without;
-    auto surgery = client::play_given(model.brain(), model.head.config, scenario,
-                                      points.displacement(space, truth->quadratic), key.seed);
-    if (!surgery) return tl::unexpected(surgery.error());
-    for (io::SurgeryTruth& each : surgery->truths) {
-      for (const NodeIndex node : anatomy ? world.removed_with : world.removed_without) {
-        each.points["removed"].push_back(
-            {Eigen::Vector4i::Constant(node), Eigen::Vector4d(1, 0, 0, 0)});
-      }
-    }
-    const auto errors = [&](const Points& nodal) {
-      return anatomy ? world.places.error_with(space, truth->quadratic, nodal)
-                     : world.places.error_without(space, truth->quadratic, nodal);
-    };
-    const double loaded_mm =
-        kind.any_mesh ? error_under_the_true_load(model.head, *truth,
-                                                  [&](const Points& u) { return errors(u).all; })
-                      : kNaN;
-    model.pipeline->reset();
-    auto& own = scores.emplace_back();
-    for (std::size_t i = 0; i < surgery->observations.size(); ++i) {
-      ModelScore& score = own.emplace_back();
-      score.loaded_mm = loaded_mm;
-      const auto update = model.pipeline->run(surgery->observations[i]);
-      if (!update) continue;
-      const Estimate& estimate = update->estimate;
-      const auto nodes =
-          surgeries::score_update(model.brain(), surgery->truths[i], estimate, static_cast<int>(i));
-      if (!nodes) return tl::unexpected(nodes.error());
-      score.status = std::string(to_string(estimate.status));
-      score.quality = std::string(to_string(estimate.quality.quality));
-      score.nodes = *nodes;
-      score.field_mm = errors(estimate.displacement);
-      score.ventricle_change_mm3 = estimate.ventricle_change_mm3;
-      score.update_ms =
-          update->timings.register_ms + update->timings.invert_ms + update->timings.rebuild_ms;
-    }
-  }
+  const auto with = estimates(*with_, world, true, kind, *truth, key.seed);
+  if (!with) return tl::unexpected(with.error());
+  const auto without = estimates(*without_, world, false, kind, *truth, key.seed);
+  if (!without) return tl::unexpected(without.error());
   std::vector<Row> rows;
-  for (std::size_t i = 0; i < scores[0].size(); ++i) {
-    rows.push_back(row_of(key, static_cast<int>(i), "", facts, scores[0][i], scores[1][i]));
+  for (std::size_t i = 0; i < with->size(); ++i) {
+    rows.push_back(row_of(key, static_cast<int>(i), "", facts, (*with)[i], (*without)[i]));
   }
   return rows;
 }

@@ -36,6 +36,8 @@ struct AnatomyKey {
 // A row with the headings, and empty cells but for key and reason.
 surgeries::Row refused_row(const AnatomyKey& key, const std::string& reason);
 
+struct ModelScore;  // what one update of one model is worth
+
 class HeadPair {
  public:
   // config: a case with anatomy.labels. Both models have meshes of their own of about this size; no
@@ -56,6 +58,11 @@ class HeadPair {
   static Result<std::unique_ptr<Model>> model_of(const CaseConfig& config, double thousand_nodes);
   static Result<std::unique_ptr<World>> world_of(const Model& home, const Model& with,
                                                  const Model& without);
+  // The truth as this model's instruments see it, and every update scored.
+  static Result<std::vector<ModelScore>> estimates(const Model& model, const World& world,
+                                                   bool anatomy, const StudyKind& kind,
+                                                   const outside::OutsideTruth& truth,
+                                                   std::uint64_t seed);
 
   std::unique_ptr<Model> with_, without_;
   std::unique_ptr<World> open_, plain_;  // with anatomy and without
