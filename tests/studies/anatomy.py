@@ -7,6 +7,7 @@
 Judged is the last update of a surgery, each head by itself. An error ratio is the mean over surgeries of the one model's
 error over that of the other; its 95 % interval is by a bootstrap over surgeries, both models of one drawn together. A
 refused update is wrong by the true motion and covers nothing. Truths without an equilibrium are told and left out.
+loaded_mm is what a model's own answer to the true load is wrong by: what no inference takes away.
 """
 import math
 
@@ -15,16 +16,20 @@ import numpy as np
 from . import chart
 from .checks import Record
 from .common import InputError, study_parser, write_file
-from .rows import Table, study_rows
+from .rows import Table, cell_or_dash, study_rows
+from .stats import over
 from .summary import finish
 
 STUDY = "anatomy"
 KINDS = ("air-side", "falx-sag", "ventricles-drain", "sag")
 BOUNDS = {"air-side": 0.6, "ventricles-drain": 0.6, "sag": 1.1}  # of the ratio; falx-sag is shown
 VOLUME_BOUND, LEAST_COVERAGE, MOST_COVERAGE = 25.0, 0.80, 0.97
-COLUMNS = ("head", "kind", "seed", "stage", "reason", "true_mm", "true_max_mm", "volume_loss", "true_change_mm3") + tuple(
+PARTS = {"": "", "opened_": " on the half with the opening", "other_": " on the other half"}  # of field errors
+COLUMNS = ("head", "kind", "seed", "stage", "reason", "true_mm", "true_opened_mm", "true_other_mm", "true_max_mm", "volume_loss",
+           "true_change_mm3") + tuple(
     f"{model}_{what}" for model in ("with", "without") for what in (
-        "status", "field_mm", "tumour_mm", "near_coverage_90", "far_coverage_90", "ventricle_change_mm3", "quality"))
+        "status", "field_mm", "field_opened_mm", "field_other_mm", "loaded_mm", "tumour_mm", "near_coverage_90",
+        "far_coverage_90", "ventricle_change_mm3", "quality"))
 DRAWS = 4000
 
 
@@ -34,19 +39,19 @@ def last_updates(rows):
     return Table(rows.columns, [row for row in last if math.isfinite(row.number("true_mm"))], rows.origin)
 
 
-def error_mm(row, model):
-    error = row.number(f"{model}_field_mm")
-    return error if math.isfinite(error) else row.number("true_mm")
+def error_mm(row, model, part=""):
+    error = row.number(f"{model}_field_{part}mm")
+    return error if math.isfinite(error) else row.number(f"true_{part}mm")
 
 
-def errors(rows):
-    """Two arrays: with and without anatomy, mm."""
-    return tuple(np.array([error_mm(row, model) for row in rows]) for model in ("with", "without"))
+def errors(rows, part=""):
+    """Two arrays: with and without anatomy, mm. part: a key of PARTS."""
+    return tuple(np.array([error_mm(row, model, part) for row in rows]) for model in ("with", "without"))
 
 
-def ratio(rows):
+def ratio(rows, part=""):
     """(ratio of means, low, high); the bootstrap has a seed of its own."""
-    ours, theirs = errors(rows)
+    ours, theirs = errors(rows, part)
     if not len(ours) or not theirs.mean() > 0.0:
         return math.nan, math.nan, math.nan
     draws = np.random.default_rng(42).integers(0, len(ours), (DRAWS, len(ours)))
@@ -96,6 +101,16 @@ class Judge:
         else:
             self.record.figure(STUDY, called, mean, f"shown ({told})", source)
 
+        for part, where in list(PARTS.items())[1:]:
+            mean, low, high = ratio(last, part)
+            ours, theirs = errors(last, part)
+            self.record.figure(STUDY, called + where, mean, f"shown (95 %: {low:.3g} to {high:.3g}; {ours.mean():.3g} and "
+                               f"{theirs.mean():.3g} of {last.mean(f'true_{part}mm'):.3g} mm)", source)
+        ours, theirs = (last.mean(f"{model}_loaded_mm") for model in ("with", "without"))
+        if math.isfinite(ours) and theirs > 0.0:
+            self.record.figure(STUDY, f"{name}: the same of the models' answers to the true load", ours / theirs,
+                               f"shown ({ours:.3g} and {theirs:.3g} mm)", source)
+
     def volumes(self, name, last, source):
         found = volume_errors_pct(last)
         bias = 100.0 * (or_zero(last.numbers("with_ventricle_change_mm3")).sum() / last.numbers("true_change_mm3").sum() - 1.0)
@@ -131,17 +146,20 @@ def draw(rows, path):
 
 
 def table_text(rows):
-    """Markdown: a line per head and kind."""
-    text = ("| head | truth | surgeries | true motion | field error without | with | ratio; 95 % | coverage near without, with "
-            "| ventricles: true change, error |\n|---|---|---|---|---|---|---|---|---|\n")
+    """Markdown: a line per head and kind. Errors are means, mm."""
+    text = ("| head | truth | surgeries | motion | error without | with | ratio; 95 % | opened half | other half "
+            "| under the true load | coverage near without, with | ventricles: change, error |\n|---|---|---|---|---|---|---|---|---|---|---|---|\n")
     for (head, kind), own in last_updates(rows).groups("head", "kind").items():
         ours, theirs = errors(own)
         mean, low, high = ratio(own)
+        halves = " | ".join(f"{ratio(own, part)[0]:.2f}" for part in ("opened_", "other_"))
+        loaded = over(own.mean("with_loaded_mm"), own.mean("without_loaded_mm"))
         covered = [float(or_zero(own.numbers(f"{model}_near_coverage_90")).mean()) for model in ("without", "with")]
         volume = "" if kind != "ventricles-drain" else (
             f"{own.mean('true_change_mm3') / 1000:.1f} cc, {volume_errors_pct(own).mean():.0f} %")
-        text += (f"| {head} | {kind} | {len(own)} | {own.mean('true_mm'):.2f} mm | {theirs.mean():.2f} mm | {ours.mean():.2f} mm "
-                 f"| {mean:.2f}; {low:.2f} to {high:.2f} | {covered[0]:.2f}, {covered[1]:.2f} | {volume} |\n")
+        text += (f"| {head} | {kind} | {len(own)} | {own.mean('true_mm'):.2f} | {theirs.mean():.2f} | {ours.mean():.2f} "
+                 f"| {mean:.2f}; {low:.2f} to {high:.2f} | {halves} | {cell_or_dash(loaded, 2)} "
+                 f"| {covered[0]:.2f}, {covered[1]:.2f} | {volume} |\n")
     return text
 
 

@@ -4,14 +4,18 @@ import pytest
 
 from made_up import text_of
 
-NAMES = ("status", "field_mm", "tumour_mm", "near_coverage_90", "far_coverage_90", "ventricle_change_mm3", "quality")
+NAMES = ("status", "field_mm", "field_opened_mm", "field_other_mm", "loaded_mm", "tumour_mm", "near_coverage_90", "far_coverage_90",
+         "ventricle_change_mm3", "quality")
 
 
 def row(kind, seed, stage, with_mm, without_mm, coverage=0.9, true=-10000.0, told=-9000.0):
-    model = lambda error, change: dict(zip(NAMES, ("converged", error, 0.1, coverage, 0.85, change, "good")))
     drained = kind == "ventricles-drain"
-    return {"head": "h", "kind": kind, "seed": seed, "stage": stage, "reason": "", "true_mm": 2.0, "true_max_mm": 6.0,
-            "volume_loss": 0.4, "true_change_mm3": true if drained else "",
+    loaded = "" if drained else 0.4
+    model = lambda error, change: dict(zip(NAMES, ("converged", error, 0.8 * error, 1.2 * error, loaded, 0.1, coverage, 0.85,
+                                                   change, "good")))
+    return {"head": "h", "kind": kind, "seed": seed, "stage": stage, "reason": "", "true_mm": 2.0, "true_opened_mm": 2.5,
+            "true_other_mm": 1.5, "true_max_mm": 6.0, "volume_loss": 0.4,
+            "true_change_mm3": true if drained else "",
             **{f"with_{name}": value for name, value in model(with_mm, told if drained else 0.0).items()},
             **{f"without_{name}": value for name, value in model(without_mm, "").items()}}
 
@@ -36,6 +40,9 @@ def test_bounds_that_hold(study):
     assert status == 0
     assert checks["air-side: field error with anatomy over without"]["value"] == pytest.approx(0.5)
     assert checks["ventricles-drain: error of the ventricles' change of volume %"]["value"] == pytest.approx(10.0)
+    assert checks["air-side: field error with anatomy over without on the other half"]["value"] == pytest.approx(0.5)
+    assert checks["air-side: the same of the models' answers to the true load"]["value"] == pytest.approx(1.0)
+    assert "ventricles-drain: the same of the models' answers to the true load" not in checks
     assert records.text("kinds.md").count("\n| h |") == 3
 
 
