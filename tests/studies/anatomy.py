@@ -117,6 +117,9 @@ class Judge:
         self.record.check(STUDY, f"{name}: error of the ventricles' change of volume %", float(found.mean()),
                           f"<= {VOLUME_BOUND:g} (mean; median {np.median(found):.3g}; all together {bias:+.3g} %)",
                           bool(found.mean() <= VOLUME_BOUND), source)
+        lost = 100.0 * last.finite("volume_loss")
+        self.record.figure(STUDY, f"{name}: part of the drained volume that is lost %", float(lost.mean()),
+                           f"shown ({lost.min():.3g} to {lost.max():.3g}; 30 to 70 were drawn)", source)
 
     def coverage(self, name, last, source):
         near = float(or_zero(last.numbers("with_near_coverage_90")).mean())

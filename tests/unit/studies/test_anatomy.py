@@ -2,7 +2,10 @@
 """With anatomy against without, on rows whose answer is known."""
 import pytest
 
-from made_up import text_of
+from made_up import DOCS, text_of
+from studies.anatomy import Judge, table_text
+from studies.checks import Record
+from studies.rows import Table
 
 NAMES = ("status", "field_mm", "field_opened_mm", "field_other_mm", "loaded_mm", "tumour_mm", "near_coverage_90", "far_coverage_90",
          "ventricle_change_mm3", "quality")
@@ -87,3 +90,13 @@ def test_a_truth_without_an_equilibrium_is_told_and_left_out(study):
 
 def test_no_rows_are_bad_input(records):
     assert records.run("anatomy")[0] == 2
+
+
+def test_the_page_has_the_table_of_its_rows():
+    rows = Table.read_all(sorted((DOCS / "anatomy").glob("rows-*.csv.gz")))
+    assert table_text(rows) in (DOCS / "anatomy.md").read_text()
+    record = Record(None)
+    Judge(rows, record).run()
+    judged = [",".join(one) for one in record.checks]
+    committed = (DOCS / "anatomy" / "checks.csv").read_text().splitlines()[1:]
+    assert judged == [line for line in committed if not line.endswith(",anatomy.sh")]
