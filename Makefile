@@ -6,7 +6,7 @@ JOBS   ?= $(shell nproc)
 BUILD  := build/$(PRESET)
 
 .DEFAULT_GOAL := help
-.PHONY: help setup configure build demo test test-kernels studies bench verify stability sensing interchange surgeries evidence ablations replays calculix prior advice page faults scaling cohort fuzz documents format format-check tidy packages image clean
+.PHONY: help setup configure build demo test test-kernels studies bench verify stability sensing interchange surgeries anatomy evidence ablations replays calculix prior advice page faults scaling cohort fuzz documents format format-check tidy packages image clean
 
 help: ## list the targets
 	@sed -n 's/^\([a-z-]*\):.*## \(.*\)/  make \1|\2/p' $(MAKEFILE_LIST) | column -t -s '|' 2>/dev/null \
@@ -62,6 +62,10 @@ interchange: setup ## exported fields in ITK, elastix, plastimatch, workbench, n
 surgeries: configure ## many different simulated surgeries on two heads, scored, into out/surgeries; hours; KINDS=a,b; RESUME=1 goes on
 	cmake --build --preset $(PRESET) -j $(JOBS) --target surgery_programs
 	cmake/scripts/surgeries.sh $(BUILD)
+
+anatomy: configure ## surgeries estimated with and without falx, tentorium and ventricles of a label map, into out/anatomy; QUICK=1, RESUME=1
+	cmake --build --preset $(PRESET) -j $(JOBS) --target anatomy_programs
+	cmake/scripts/anatomy.sh $(BUILD)
 
 evidence: configure ## twins of the paper's five patients against truths with another mesh, gap, stiffness ..., into out/evidence; QUICK=1
 	cmake --build --preset $(PRESET) -j $(JOBS) --target evidence_programs

@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 # Sourced by demo.sh, bench.sh, verify.sh, stability.sh, sensing.sh, interchange.sh, surgeries.sh,
-# evidence.sh, ablations.sh, replays.sh, calculix.sh, prior.sh, advice.sh and page.sh: timed steps, the daemon, and the end of a script.
+# anatomy.sh, evidence.sh, ablations.sh, replays.sh, calculix.sh, prior.sh, advice.sh and page.sh: timed steps, the
+# daemon, and the end of a script.
 # They set before: `name`, the first word of messages; `bin`, the folder of the programs; `out`, the
 # folder of results. They set `current=summary` before a last command whose own output tells what failed.
 

@@ -6,7 +6,9 @@
 #include <algorithm>
 #include <utility>
 
+#include "client/tools/twin/sheets.hpp"
 #include "common/fem/space_elasticity.hpp"
+#include "common/geometry/surface.hpp"
 #include "common/patient/read_patient.hpp"
 
 namespace brainshift::client {
@@ -47,15 +49,23 @@ Result<BrainModel> mesh_anew(const CaseConfig& config, const Progress& progress)
   return patient::build_patient(other, progress);
 }
 
+SpacePoints nodes_elsewhere(const BrainModel& model, const BrainModel& other,
+                            const geometry::TetLocator& locator) {
+  const bool sheets = other.septa.triangles.cols() > 0;
+  return SpacePoints(locator, sheets ? nodes_in_their_sides(model) : model.mesh.nodes);
+}
+
 Result<std::shared_ptr<const OtherMesh>> make_other_mesh(const BrainModel& model,
                                                          BrainModel other) {
   geometry::TetLocator locator(other.mesh);
-  SpacePoints nodes(locator, model.mesh.nodes);
+  SpacePoints nodes = nodes_elsewhere(model, other, locator);
   SpacePoints tumour(locator, model.tumour.vertices);
-  if (nodes.farthest_outside_mm() > kLargestMismatch_mm) {
+  const SpacePoints surface(
+      locator, geometry::surface_of(model.mesh.nodes, model.boundary_triangles).vertices);
+  if (surface.farthest_outside_mm() > kLargestMismatch_mm) {
     return invalid(fmt::format(
         "the other mesh leaves out a node of the case's mesh by {:.1f} mm: not the same head",
-        nodes.farthest_outside_mm()));
+        surface.farthest_outside_mm()));
   }
   fem::DisplacementSpace space = fem::make_space(other.mesh, fem::Element::kP2);
   return std::make_shared<const OtherMesh>(OtherMesh{

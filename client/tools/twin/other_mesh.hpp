@@ -55,8 +55,14 @@ struct OtherMesh {
   SpacePoints nodes, tumour;     // nodes and tumour's vertices of the case's model
 };
 
+// The nodes of a model in another mesh of its head, whose locator this is: where both have sheets
+// of falx and tentorium, each node of a sheet on its own side (sheets.hpp).
+SpacePoints nodes_elsewhere(const BrainModel& model, const BrainModel& other,
+                            const geometry::TetLocator& locator);
+
 // model: of the case. other: of the same head; its tumour is not looked at. kInvalidArgument when
-// the meshes are more than kLargestMismatch_mm apart somewhere: not the same head.
+// the case's outer surface lies more than kLargestMismatch_mm outside the other mesh somewhere: not
+// the same head. A node in a ventricle of the other mesh may be as deep in it as it is wide.
 inline constexpr double kLargestMismatch_mm = 5.0;
 Result<std::shared_ptr<const OtherMesh>> make_other_mesh(const BrainModel& model, BrainModel other);
 

@@ -2,11 +2,11 @@
 #include "client/tools/twin/truth.hpp"
 
 #include <Eigen/Geometry>
-#include <map>
 #include <string>
 #include <utility>
 
 #include "client/tools/twin/adverse.hpp"
+#include "client/tools/twin/sheets.hpp"
 #include "client/tools/twin/stiffness.hpp"
 
 namespace brainshift::client {
@@ -63,29 +63,16 @@ void set_gaps(std::uint64_t seed, const Points& nodes, std::vector<contact::Cont
   }
 }
 
-// Sheets of falx and tentorium: nodes of one side, by the mean normal of its facets there. At a
-// free edge those of both sides cancel.
+// Sheets of falx and tentorium; of quadratic elements the middles of edges carry the load.
 void add_septa(const BrainModel& model, const fem::DisplacementSpace& space,
                const std::vector<Hold>& hold, std::vector<contact::ContactPair>& pairs) {
-  std::map<NodeIndex, std::pair<Vec3, double>> into;  // areas as vectors and as numbers
-  for (const auto& face : model.septa.triangles.colwise()) {
-    const Vec3 a = space.nodes.col(face[0]);
-    const Vec3 area = Vec3(space.nodes.col(face[1]) - a).cross(Vec3(space.nodes.col(face[2]) - a));
-    const auto nodes = fem::face_nodes(space, face);
-    const int first = space.element == fem::Element::kP1 ? 0 : 3;
-    for (int k = first; k < space.nodes_per_face(); ++k) {
-      auto& sum =
-          into.try_emplace(nodes[static_cast<std::size_t>(k)], Vec3::Zero(), 0.0).first->second;
-      sum.first -= area;
-      sum.second += area.norm();
-    }
-  }
-  for (const auto& [node, sum] : into) {
-    if (sum.first.norm() < 0.1 * sum.second || hold[static_cast<std::size_t>(node)] == Hold::kFixed)
-      continue;
-    const Vec3 normal = sum.first.normalized();
-    pairs.push_back(
-        {node, space.nodes.col(node) - model.septa.gap_mm * normal, normal, -model.septa.gap_mm});
+  for (const SheetNode& side : sheet_nodes(model.septa, space)) {
+    const bool carries_load =
+        space.element == fem::Element::kP1 || side.node >= space.num_vertices();
+    if (!carries_load || hold[static_cast<std::size_t>(side.node)] == Hold::kFixed) continue;
+    const Vec3 normal = -side.normal;
+    pairs.push_back({side.node, space.nodes.col(side.node) - model.septa.gap_mm * normal, normal,
+                     -model.septa.gap_mm});
   }
 }
 

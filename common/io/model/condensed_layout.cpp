@@ -65,16 +65,18 @@ class Check {
       if (!found_) that(all_finite(values), name, "holds a number that is not finite");
     }
   }
-  // Distinct indices below `limit`.
-  void nodes(const std::string& name, const std::vector<NodeIndex>& list, Eigen::Index limit,
-             bool sorted) {
-    std::vector<NodeIndex> ordered = list;
-    if (!sorted) std::sort(ordered.begin(), ordered.end());
-    const bool rises = std::adjacent_find(ordered.begin(), ordered.end(),
-                                          [](int a, int b) { return a >= b; }) == ordered.end();
-    that(rises, name, sorted ? "is not sorted" : "names a node twice");
-    that(!rises || ordered.empty() || (ordered.front() >= 0 && ordered.back() < limit), name,
+  // Indices below `limit`.
+  void nodes(const std::string& name, const std::vector<NodeIndex>& list, Eigen::Index limit) {
+    that(std::all_of(list.begin(), list.end(), [&](int i) { return i >= 0 && i < limit; }), name,
          "names a node that the mesh does not have");
+  }
+  // The same, each once and in increasing order.
+  void sorted_nodes(const std::string& name, const std::vector<NodeIndex>& list,
+                    Eigen::Index limit) {
+    that(std::adjacent_find(list.begin(), list.end(), [](int a, int b) { return a >= b; }) ==
+             list.end(),
+         name, "is not sorted");
+    nodes(name, list, limit);
   }
   std::optional<std::string> found() const { return found_; }
 
@@ -100,6 +102,7 @@ bool symmetric(const Eigen::MatrixXd& matrix) {
   return true;
 }
 
+// As often as they are: a slave of the skull may be one of a sheet too, or of two sheets.
 bool are_slaves(std::vector<NodeIndex> list, std::vector<NodeIndex> slaves) {
   std::sort(list.begin(), list.end());
   std::sort(slaves.begin(), slaves.end());
@@ -237,13 +240,13 @@ std::optional<std::string> incompatibility_of(const CondensedOperators& operator
   check.that(operators.model_id == model.model_id, "model_id",
              "is '" + operators.model_id + "': the operators belong to another model than '" +
                  model.model_id + "'");
-  check.nodes("slaves", operators.slaves, n, false);
+  check.nodes("slaves", operators.slaves, n);
   std::vector<NodeIndex> slaves = model.slaves;
   slaves.insert(slaves.end(), model.septa.slaves.begin(), model.septa.slaves.end());
   check.that(are_slaves(operators.slaves, std::move(slaves)), "slaves",
-             "names a node that is no slave of the model");
-  check.nodes("region", operators.region, n, true);
-  check.nodes("control", operators.control, n, true);
+             "names a node that is no slave of the model, or more often than it is one");
+  check.sorted_nodes("region", operators.region, n);
+  check.sorted_nodes("control", operators.control, n);
   check.that(operators.num_nodes() == n, "responses",
              fmt::format("has {} nodes: must have {}", operators.num_nodes(), n));
   check.that(r >= 0, "responses",

@@ -11,6 +11,7 @@
 #include "common/core/statistics.hpp"
 #include "common/core/units.hpp"
 #include "common/fem/space_elasticity.hpp"
+#include "tests/surgeries/outside/cavity.hpp"
 
 namespace brainshift::outside {
 namespace {
@@ -67,6 +68,10 @@ Region opened_half(const OutsideHead& head) {
   return [&head](const Vec3& x) { return head.side_of(x) > 0.0; };
 }
 
+Event air_both(const OutsideHead& head, Random& random) {
+  return air_in(head, random, everywhere());
+}
+
 Event air_side(const OutsideHead& head, Random& random) {
   return air_in(head, random, opened_half(head));
 }
@@ -103,10 +108,26 @@ std::function<Points(const fem::DisplacementSpace&)> pressed(const Region& in, d
   };
 }
 
+// Of cavities the volume that their wall encloses; of soft ellipsoids what their strain says.
 Event ventricles_drain(const OutsideHead& head, Random& random) {
   Event event;
-  event.region = ventricles(head, random.uniform() < 0.3 ? 1 : 0);
-  event.load = pressed(event.region, -1e-4);
+  const int half = random.uniform() < 0.3 ? 1 : 0;
+  if (head.has_cavities()) {
+    const Wall wall = head.mesh->model.ventricle_wall;
+    const CavityPart part{head.middle()[0], half * head.opening_side};
+    event.load = [=](const fem::DisplacementSpace& space) {
+      return suction_load(space, wall, part, 1e-4);
+    };
+    event.lost = [=](const fem::DisplacementSpace& space, const Points& u) {
+      return cavity_loss(space, u, wall, part);
+    };
+  } else {
+    const Region region = ventricles(head, half);
+    event.load = pressed(region, -1e-4);
+    event.lost = [=](const fem::DisplacementSpace& space, const Points& u) {
+      return volume_loss(space, u, region);
+    };
+  }
   event.volume_loss = between(random, 0.3, 0.7);
   event.largest_mm = 14.0;
   return event;
@@ -323,6 +344,11 @@ const Kind* find_kind(const std::string& name) {
   return nullptr;
 }
 
+const Kind& plain_sag() {
+  static const Kind kind{"sag", "air above both halves", air_both};
+  return kind;
+}
+
 Points weight_load(const fem::DisplacementSpace& space, const Vec3& down, const Region& in) {
   const Vec3 weight = units::weight_density_from_kg_m3(1000.0) * down;
   return fem::body_load(space, fem::VectorField([&](const Vec3& x) -> Vec3 {
@@ -351,7 +377,7 @@ double volume_loss(const fem::DisplacementSpace& space, const Points& u, const R
   double volume = 0.0, lost = 0.0;
   for (int e = 0; e < space.num_elements(); ++e) {
     const Vec3 x = space.mesh.nodes(Eigen::all, space.mesh.tets.col(e)).rowwise().mean();
-    if (!region || !region(x)) continue;
+    if (!region(x)) continue;
     const double v = fem::tet_geometry(space.mesh, e).volume;
     volume += v;
     const Eigen::Vector4d centre = Eigen::Vector4d::Constant(0.25);

@@ -19,9 +19,10 @@ struct Event {
   // not count: they are multiplied by what gives `largest_mm` or `volume_loss`.
   std::function<Points(const fem::DisplacementSpace&)> load;
   double largest_mm = 0.0;  // the largest motion of a node of tissue
-  // Instead: this part of the region's volume is lost, unless a node moves farther than largest_mm.
+  // Instead: this part of a volume is lost, unless a node moves farther than largest_mm.
   double volume_loss = 0.0;
-  Region region;
+  // What part is, under nodal displacements u, 3 x nodes of the space. Empty: of no volume.
+  std::function<double(const fem::DisplacementSpace&, const Points& u)> lost;
   Changes changes;
   Region no_wall;                           // where the skull is gone; empty: nowhere else
   std::optional<double> resected_fraction;  // of the tumour; changes.cavity says which elements
@@ -34,6 +35,9 @@ struct Kind {
 };
 const std::vector<Kind>& all_kinds();
 const Kind* find_kind(const std::string& name);  // nullptr when unknown
+// Air above both halves: what the prior holds. Not one of all_kinds(); studies hold others against
+// it.
+const Kind& plain_sag();
 
 // Loads, 3 x nodes of the space, N.
 //
@@ -42,7 +46,7 @@ Points weight_load(const fem::DisplacementSpace& space, const Vec3& down, const 
 // f_i = int p grad N_i dV, p in N/mm^2 at places: pressure p of the tissue pushes outwards.
 Points pressure_load(const fem::DisplacementSpace& space,
                      const std::function<double(const Vec3&)>& pressure);
-// The part of the region's volume that is lost: - int_region div u / volume. 0 without a region.
+// The part of the region's volume that is lost: - int_region div u / volume. 0 where it has none.
 double volume_loss(const fem::DisplacementSpace& space, const Points& u, const Region& region);
 
 }  // namespace brainshift::outside

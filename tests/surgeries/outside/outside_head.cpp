@@ -5,6 +5,7 @@
 #include <cmath>
 #include <utility>
 
+#include "client/tools/twin/sheets.hpp"
 #include "client/tools/twin/stiffness.hpp"
 #include "common/core/random.hpp"
 #include "common/geometry/closest_point.hpp"
@@ -80,7 +81,11 @@ Result<OutsideHead> make_outside_head(const BrainModel& model, const CaseConfig&
   head.opening = head.opening_nodes.rowwise().mean();
   head.tumour = model.tumour.vertices.rowwise().mean();
   head.opening_side = head.opening[0] < head.middle()[0] ? -1.0 : 1.0;
-  const auto surface = geometry::ClosestPointIndex::build(geometry::boundary_surface(body));
+  const BrainModel& own = head.mesh->model;
+  Eigen::Matrix<int, 3, Eigen::Dynamic> cortex(
+      3, own.boundary_triangles.cols() + own.septa.triangles.cols());
+  cortex << own.boundary_triangles, own.septa.triangles;
+  const auto surface = geometry::ClosestPointIndex::build(geometry::surface_of(body.nodes, cortex));
   if (!surface) return tl::unexpected(surface.error());
   const auto tumour = geometry::ClosestPointIndex::build(model.tumour);
   if (!tumour) return tl::unexpected(tumour.error());
@@ -133,7 +138,7 @@ fem::MaterialMap tissue_of(const OutsideHead& head, const Changes& changes, std:
   for (int t = 0; t < mesh.num_tets(); ++t) {
     const auto at = static_cast<std::size_t>(t);
     const Vec3 x = centre_of(mesh, t);
-    const bool in_fluid = fluid(x) && head.in_tumour[at] == 0;
+    const bool in_fluid = !head.has_cavities() && fluid(x) && head.in_tumour[at] == 0;
     const double factor = head.in_tumour[at] != 0 ? tumour
                           : in_fluid              ? ventricle
                           : head.grey[at] != 0    ? grey
@@ -156,16 +161,18 @@ Supports supports_of(const OutsideHead& head, const Changes& changes, std::uint6
   Random random(seed + 23);
   const double base = 0.5 * kPerKpa * std::exp(0.5 * random.normal());
   const client::GaussianField gap(30.0, random.index(1u << 30));
+  const client::GaussianField sheet_gap(30.0, random.index(1u << 30));
   const fem::DisplacementSpace& space = head.space();
   const Surface surface = surface_of(*head.mesh);
   Supports supports{fem::DofMap(space.num_nodes()), {}, {}};
+  const bool sheets = changes.sheets && !head.has_sheets();
   // A sheet of one layer of nodes: vertices and middles lie about half an edge apart.
   const double edge = std::cbrt(head.extent().prod() / space.num_vertices());
   for (int node = 0; node < space.num_nodes(); ++node) {
     const Vec3 x = space.nodes.col(node);
-    if (changes.sheets && on_falx(head, x, 0.25 * edge)) {
+    if (sheets && on_falx(head, x, 0.25 * edge)) {
       supports.dofs.fix_normal(node, Vec3::UnitX());
-    } else if (changes.sheets && on_tentorium(head, x, 0.25 * edge)) {
+    } else if (sheets && on_tentorium(head, x, 0.25 * edge)) {
       supports.dofs.fix_normal(node, tentorium_normal());
     }
     const double area = surface.area.col(node).norm();
@@ -186,6 +193,11 @@ Supports supports_of(const OutsideHead& head, const Changes& changes, std::uint6
       case Hold::kFree:
       case Hold::kInner: break;
     }
+  }
+  // Slits of the mesh: sides by vertices too, whose tissue would bulge through a thin sheet.
+  for (const client::SheetNode& side : client::sheet_nodes(head.mesh->model.septa, space)) {
+    const double part = client::normal_cdf(sheet_gap.at(space.nodes.col(side.node)));
+    supports.sides.push_back({side.node, side.normal, 0.2 + part});
   }
   supports.dofs.finalise();
   return supports;

@@ -17,6 +17,14 @@
 //   opening     free
 //   falx, tentorium   where a kind asks for them: nodes of the sheet are held along its normal
 //
+// A case whose label map tells its anatomy (anatomy.labels) has its own sheets and ventricles here,
+// in this mesh:
+//
+//   falx, tentorium   of every kind: walls on both sides of a slit, 0.2 to 1.2 mm away, varying
+//                     over 30 mm (the estimate believes 0.5 mm), without springs
+//   ventricles        cavities; no tissue is soft instead. Grey matter lies along slits too, and
+//                     not along the cavities
+//
 // Lengths that depend on the head are parts of its extents. All draws are uniform unless stated.
 #pragma once
 
@@ -49,6 +57,8 @@ struct OutsideHead {
   Vec3 extent() const { return high - low; }
   double side_of(const Vec3& x) const { return opening_side * (x[0] - middle()[0]); }
   const fem::DisplacementSpace& space() const { return mesh->space; }
+  bool has_sheets() const { return mesh->model.septa.triangles.cols() > 0; }
+  bool has_cavities() const { return mesh->model.ventricle_wall.cols() > 0; }
 };
 
 // model, config: the case as the estimate knows it. Errors of mesh_anew, make_other_mesh,
@@ -68,7 +78,7 @@ Vec3 tentorium_normal();
 struct Changes {
   std::function<double(const Vec3&)> softer;  // factor of G at an element's centre; empty: none
   std::vector<char> cavity;                   // per element; empty: none. Nothing is left there.
-  bool sheets = false;                        // falx and tentorium hold
+  bool sheets = false;                        // falx and tentorium hold, in a head without its own
   bool plain() const { return !softer && cavity.empty() && !sheets; }
 };
 

@@ -100,7 +100,11 @@ OutsideTruth OutsideTruths::judged(const Event& event, const Moved& moved, doubl
   truth.load_scale = scale;
   truth.resected_fraction = event.resected_fraction;
   truth.pressed = static_cast<int>((moved.pressing.array() > 0.0).count());
-  truth.volume_loss = volume_loss(head_.space(), moved.u, event.region);
+  truth.volume_loss = event.lost ? event.lost(head_.space(), moved.u) : 0.0;
+  truth.quadratic = moved.u;
+  truth.load = [load = event.load, scale](const fem::DisplacementSpace& space) -> Points {
+    return scale * load(space);
+  };
   const Points after = model_.mesh.nodes + truth.displacement;
   for (int t = 0; t < model_.mesh.num_tets(); ++t) {
     if (!tissue_.empty() && tissue_[static_cast<std::size_t>(t)] == 0) continue;

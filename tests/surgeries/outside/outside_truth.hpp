@@ -4,6 +4,7 @@
 #pragma once
 
 #include <cstdint>
+#include <functional>
 #include <map>
 #include <memory>
 #include <optional>
@@ -15,11 +16,14 @@ namespace brainshift::outside {
 
 struct OutsideTruth {
   Points displacement;  // 3 x nodes of the case's mesh, mm
+  Points quadratic;     // the same field: 3 x nodes of the head's space, mm
+  // What moved it, N, 3 x nodes of any space of the head; while the truths' head lives.
+  std::function<Points(const fem::DisplacementSpace&)> load;
   double largest_mm = 0.0;
   double load_scale = 1.0;
   double min_volume_ratio = 1.0;            // of the case's mesh, cavities apart
   int pressed = 0;                          // sides that touch the skull
-  double volume_loss = 0.0;                 // of Event::region
+  double volume_loss = 0.0;                 // Event::lost
   std::optional<double> resected_fraction;  // Event
 };
 

@@ -172,7 +172,7 @@ TEST(CondensedFile, OperatorsThatDoNotFitTheModelAreNotWritten) {
       {"slaves names a node that is no slave", [](Operators& o) { o.slaves[0] = 1; }},
       {"slaves names a node that the mesh does not have", [](Operators& o) { o.slaves[0] = 5; }},
       {"slaves names a node that the mesh does not have", [](Operators& o) { o.slaves[1] = -1; }},
-      {"slaves names a node twice",
+      {"slaves names a node that is no slave of the model, or more often",
        [](Operators& o) {
          o.slaves = {2, 2};
        }},
@@ -224,6 +224,21 @@ TEST(CondensedFile, OperatorsThatDoNotFitTheModelAreNotWritten) {
         << misfit.message;
     EXPECT_EQ(folder.entries(), 0u);
   }
+}
+
+// Where a sheet meets the skull, or two sheets one another.
+TEST(CondensedFile, ASlaveOfSkullAndSheetIsThereTwice) {
+  const TemporaryFolder folder;
+  ModelFile file = condensed_file();
+  file.model.septa.slaves = {2};
+  file.model.septa.normals = Vec3::UnitX();
+  file.model.model_id = content_hash(file.model);
+  for (CondensedOperators& each : file.condensed) each.model_id = file.model.model_id;
+  file.condensed[0].slaves = {2, 2};
+  const Status written = write_model(folder / "m.h5", file);
+  ASSERT_TRUE(written) << written.error().message;
+  const auto read = value_or_fail(read_model(folder / "m.h5"));
+  expect_equal(read.condensed[0], file.condensed[0]);
 }
 
 TEST(CondensedFile, LargestAndTinyNumbersAreFinite) {
