@@ -41,9 +41,10 @@ struct CondenseOptions {
   int threads = 0;       // 0: as many as cores
 };
 
-// Within condensed.memory_limit_gib (within_memory). kInvalidArgument when that is too little all
-// the same (the sentence names both), and when the case's prior allows no motion at all or ten times as much as a skull
-// does (the sentence has the figure); kUnavailable when stopped; kNotFinite; errors of the store.
+// Within condensed.memory_limit_gib (within_memory). kInvalidArgument when that is too little
+// (the sentence names both), and when the case's prior allows no motion at all or ten times as much
+// as a skull does (the sentence has the figure); kUnavailable when stopped; kNotFinite; errors of
+// the store.
 Result<CondensedOperators> condense(const PreparedModel& model,
                                     const CondenseOptions& options = {});
 // The same; frees the model, whose factor is as large as all else, before step 5.
