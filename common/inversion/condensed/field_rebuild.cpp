@@ -102,6 +102,7 @@ FieldRebuild::FieldRebuild(const CondensedOperators& operators, ModeWindow windo
       control_contact_(
           decode_rows(operators.responses, operators.control,
                       column_range(operators.contact_column(0), operators.num_slaves()), team)),
+      response_(operators.num_slaves(), window.count),
       factor_(window.count, window.count),
       conditioned_(control_modes_.rows(), window.count),
       spread_(control_modes_.rows(), window.count),
@@ -280,7 +281,8 @@ void FieldRebuild::standard_deviation(ThreadTeam& team, const ContactReduction& 
   // Single precision is exact enough for a standard deviation.
   factor_.setZero(r, r);
   factor_.triangularView<Eigen::Lower>() = covariance_factor.cast<float>();
-  const auto response = contact.response_single().leftCols(r);
+  Eigen::Map<Eigen::MatrixXf> response(response_.data(), k, r);
+  if (k > 0) response = contact.response().leftCols(r).cast<float>();
   Eigen::Map<Eigen::MatrixXf> columns(contact_storage_.get(), control_contact_.rows(), k);
   team.split(static_cast<long>(operators_.control.size()), [&](long begin, long end) {
     const Eigen::Index first = 3 * begin, rows = 3 * (end - begin);

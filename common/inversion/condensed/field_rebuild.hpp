@@ -115,7 +115,7 @@ class FieldRebuild {
   std::vector<int> some_blocks_;  // of displacement_at()
   std::vector<char> has_block_;
   // Control nodes: rows of U and G, V, and what a set needs of them.
-  Eigen::MatrixXf control_modes_, control_contact_, factor_, conditioned_, spread_;
+  Eigen::MatrixXf control_modes_, control_contact_, response_, factor_, conditioned_, spread_;
   Eigen::VectorXf prior_squares_;              // variances of the modes, r
   Eigen::VectorXf squares_, prior_at_;         // of the control nodes' rows: |row|^2
   std::unique_ptr<float[]> explained_, seen_;  // X^T, and V X^T

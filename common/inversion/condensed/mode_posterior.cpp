@@ -96,8 +96,6 @@ void ModePosterior::reserve(int data) {
   if (3 * data <= jacobian_.rows()) return;
   linalg::replace(residual_, 3 * data);
   linalg::replace(changed_, 3 * data, ContactReduction::kMaxChanges);
-  linalg::replace(product_, 3 * data,
-                  std::max<Eigen::Index>(ContactReduction::kMaxChanges, window_.count + 1));
   linalg::replace(jacobian_, 3 * data, SparseData::kMaxCommonErrors + window_.count + 1);
 }
 
@@ -105,12 +103,11 @@ void ModePosterior::reserve(int data) {
 void ModePosterior::follow_changes(SampledOperators& sampled, const ContactReduction& reduction,
                                    ThreadTeam& team) {
   auto moved = changed_.topLeftCorner(rows_, reduction.changes());
-  const auto contact = sampled.contact_single(reduction.active());
-  const auto columns = reduction.change_columns_single();
+  const auto contact = sampled.contact(reduction.active());
+  const auto columns = reduction.change_columns();
   in_parts(team, moved.cols(), [&](long begin, long end) {
-    auto product = product_.block(0, begin, rows_, end - begin);
-    blas::multiply(1.0F, contact, columns.middleCols(begin, end - begin), 0.0F, product);
-    moved.middleCols(begin, end - begin) = product.cast<double>();
+    blas::multiply(1.0, contact, columns.middleCols(begin, end - begin), 0.0,
+                   moved.middleCols(begin, end - begin));
   });
   const auto left = sampled.contact(reduction.left());
   moved.leftCols(left.cols()) -= left;
@@ -131,12 +128,11 @@ void ModePosterior::linearise(SampledOperators& sampled, const ContactReduction&
   if (same_data && reduction.changes() > 0) {
     follow_changes(sampled, reduction, team);
   } else if (j = sampled.free_body(); reduction.size() > 0) {
-    const auto contact = sampled.contact_single(reduction.active());
-    const auto response = reduction.response_single();
+    const auto contact = sampled.contact(reduction.active());
+    const auto response = reduction.response();
     in_parts(team, r + 1, [&](long begin, long end) {
-      auto product = product_.block(0, begin, rows_, end - begin);
-      blas::multiply(1.0F, contact, response.middleCols(begin, end - begin), 0.0F, product);
-      j.middleCols(common_ + begin, end - begin) -= product.cast<double>();
+      blas::multiply(-1.0, contact, response.middleCols(begin, end - begin), 1.0,
+                     j.middleCols(common_ + begin, end - begin));
     });
   }
   // Parts of the lower triangle with about as much work for each thread.

@@ -64,10 +64,8 @@ class ModePosterior {
   explicit ModePosterior(ModeWindow window);
   void reserve(int data);
 
-  // The linear model of the reduction's set: J, G = J^T J and b = J^T d. What contact adds to J is
-  // a sum in single precision, 6e-8 of its largest terms: J sets the direction of a descent, and
-  // the covariance; where a descent ends is decided by gradients in double. same_data: the last
-  // call was for the same data and for the set before, so that J follows the reduction's changes.
+  // The linear model of the reduction's set: J, G = J^T J and b = J^T d. same_data: the last call
+  // was for the same data and for the set before, so that J follows the reduction's changes.
   void linearise(SampledOperators& sampled, const ContactReduction& reduction, bool same_data,
                  ThreadTeam& team);
   // Standard deviation of common error `k` under an error hypothesis.
@@ -137,7 +135,6 @@ class ModePosterior {
   int common_ = 0;
   Eigen::Index rows_ = 0;
   Eigen::MatrixXd jacobian_, changed_;  // changed_: R^-1/2 A of what changes of the set move
-  Eigen::MatrixXf product_;             // of sampled contact and what forces follow
   VecX residual_, gram_storage_, factor_storage_, right_, solution_, z_;
   VecX scales_;  // V^1/2 for c, s for z
   linalg::GrowingMatrix common_variance_;

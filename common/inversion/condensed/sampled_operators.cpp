@@ -35,7 +35,6 @@ void SampledOperators::reserve(int data) {
   const std::size_t contact = 3 * static_cast<std::size_t>(data) * slaves;
   // Uninitialised: memory is used as it is touched.
   std::unique_ptr<double[]> columns(new double[contact]), whitened(new double[contact]);
-  std::unique_ptr<float[]> single(new float[contact]);
   linalg::replace(rows_, 4, data);
   linalg::replace(barycentric_, 4, data);
   linalg::replace(weights_, 4, data);
@@ -51,7 +50,6 @@ void SampledOperators::reserve(int data) {
   columns_.reserve(slaves);
   contact_columns_ = std::move(columns);
   whitened_contact_ = std::move(whitened);
-  whitened_single_ = std::move(single);
   capacity_ = data;  // all of it is there
 }
 
@@ -212,28 +210,18 @@ void SampledOperators::sample_contact(const std::vector<int>& slaves) {
   });
 }
 
-template <typename T>
-Eigen::Map<const Eigen::Matrix<T, Eigen::Dynamic, Eigen::Dynamic>> SampledOperators::whiten_contact(
-    const std::vector<int>& active, T* to) {
+Eigen::Map<const Eigen::MatrixXd> SampledOperators::contact(const std::vector<int>& active) {
   sample_contact(active);
-  Eigen::Map<Eigen::Matrix<T, Eigen::Dynamic, Eigen::Dynamic>> whitened(
-      to, rows(), static_cast<Eigen::Index>(active.size()));
+  Eigen::Map<Eigen::MatrixXd> whitened(whitened_contact_.get(), rows(),
+                                       static_cast<Eigen::Index>(active.size()));
   team_.split(whitened.cols(), [&](long begin, long end) {
     for (long j = begin; j < end; ++j) {
       const Eigen::Map<const VecX> column(contact_column(active[static_cast<std::size_t>(j)]),
                                           rows());
-      whitened.col(j) = row_weights_.head(rows()).cwiseProduct(column).template cast<T>();
+      whitened.col(j) = row_weights_.head(rows()).cwiseProduct(column);
     }
   });
-  return {to, rows(), whitened.cols()};
-}
-
-Eigen::Map<const Eigen::MatrixXd> SampledOperators::contact(const std::vector<int>& active) {
-  return whiten_contact(active, whitened_contact_.get());
-}
-
-Eigen::Map<const Eigen::MatrixXf> SampledOperators::contact_single(const std::vector<int>& active) {
-  return whiten_contact(active, whitened_single_.get());
+  return {whitened_contact_.get(), rows(), whitened.cols()};
 }
 
 void SampledOperators::subtract_contact(const std::vector<int>& active,

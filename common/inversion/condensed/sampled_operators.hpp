@@ -61,8 +61,6 @@ class SampledOperators {
   auto modes_before() const { return before_.topRows(rows()); }
   // R^-1/2 A G_A; valid until the next call.
   Eigen::Map<const Eigen::MatrixXd> contact(const std::vector<int>& active);
-  // The same in single precision, as which A G_A came; valid until the next call.
-  Eigen::Map<const Eigen::MatrixXf> contact_single(const std::vector<int>& active);
   // out -= R^-1/2 A G_A f; f: one force per active slave, N; out: rows.
   void subtract_contact(const std::vector<int>& active, const Eigen::Ref<const VecX>& forces,
                         VecX& out);
@@ -84,10 +82,6 @@ class SampledOperators {
   void sample_column(const float* array, const NodeWeights& weights, double* out) const;
   // A G of these slaves, in contact_columns_ from now on.
   void sample_contact(const std::vector<int>& slaves);
-  // R^-1/2 A G_A to `to`, rounded to its type; what contact() gives.
-  template <typename T>
-  Eigen::Map<const Eigen::Matrix<T, Eigen::Dynamic, Eigen::Dynamic>> whiten_contact(
-      const std::vector<int>& active, T* to);
   const double* contact_column(int slave) const {
     return contact_columns_.get() + static_cast<std::ptrdiff_t>(rows()) * slave;
   }
@@ -112,7 +106,6 @@ class SampledOperators {
   VecX row_weights_, forced_;  // rows; R^-1/2, and what forces or adjoint make of it
   // A G, a column per slave, of those that have been asked for since locate(); whitened when used.
   std::unique_ptr<double[]> contact_columns_, whitened_contact_;
-  std::unique_ptr<float[]> whitened_single_;
   std::vector<char> has_column_;  // by slave
   std::vector<int> missing_;
   std::vector<const double*> columns_;  // of subtract_contact()

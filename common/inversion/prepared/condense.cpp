@@ -214,33 +214,30 @@ Status prior_modes(const PreparedModel& model, BlockRunner& runner, bool one_fie
   const std::vector<NodeIndex> everywhere =
       geometry::spread_nodes(model.model().mesh.nodes, model.config().condensed.uncertainty_nodes);
   const TestVectors omega_far = test_vectors(result, everywhere, tested_far);
-  std::array<MatrixXd, kRemainders> sketches;
-  const auto sketch = [&](std::size_t g, int first, int count, auto& own) -> Status {
-    own.loads.resize(count, rows);
-    if (count > 0) prior.kernel(static_cast<int>(g)).apply(own.solved, own.loads);
-    if (auto solved = own.solver.solve(own.loads, own.loads); !solved) return solved;
-    const int before = runner.own_first(g == kFarField ? tested_far : tested);
-    sketches[g].middleRows(first - before, count) = own.loads;
-    return {};
-  };
   // The modes of some fields that share their test vectors.
   const auto modes_of = [&](std::string_view stage, const TestVectors& vectors,
                             std::span<const std::size_t> fields) -> Status {
     const auto count_of = static_cast<int>(vectors.numbers.rows());
-    for (const std::size_t g : fields) sketches[g].resize(runner.own_count(count_of), rows);
+    const int before = runner.own_first(count_of);
+    std::vector<MatrixXd> sketches(fields.size());
+    for (MatrixXd& sketch : sketches) sketch.resize(runner.own_count(count_of), rows);
     auto ran = runner.run(stage, count_of, [&](int first, int count, auto& own) -> Status {
       vectors.write(first, count, rows, own.loads);
       if (auto solved = own.solver.solve(own.loads, own.solved); !solved) return solved;
-      for (const std::size_t g : fields) {
-        if (auto sketched = sketch(g, first, count, own); !sketched) return sketched;
+      for (std::size_t f = 0; f < fields.size(); ++f) {
+        own.loads.resize(count, rows);
+        if (count > 0) prior.kernel(static_cast<int>(fields[f])).apply(own.solved, own.loads);
+        if (auto solved = own.solver.solve(own.loads, own.loads); !solved) return solved;
+        sketches[f].middleRows(first - before, count) = own.loads;
       }
       return {};
     });
     if (!ran) return ran;
-    for (const std::size_t g : fields) {
-      const auto leading = leading_modes(vectors, sketches[g], kept[g], runner);
+    for (std::size_t f = 0; f < fields.size(); ++f) {
+      const std::size_t g = fields[f];
+      const auto leading = leading_modes(vectors, sketches[f], kept[g], runner);
       if (!leading) return tl::unexpected(leading.error());
-      sketches[g].resize(0, 0);
+      sketches[f].resize(0, 0);
       result.part_columns[kLoadParts + g] = static_cast<int>(leading->rows());
       append_modes(*leading, modes, result);
     }

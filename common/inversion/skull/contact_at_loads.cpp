@@ -156,7 +156,7 @@ void ContactAtLoads::begin_set() {
   if (active_.size() <= corrected_.size()) {
     auto forces = forces_.head(size());
     gather(all_forces_.data(), active_, forces.data());
-    system_.compliance().subtract(active_, forces, penetration_);
+    subtract_penetration(operators_, active_, forces, team_, penetration_);
   } else {
     team_.split(static_cast<long>(corrected_.size()), [&](long begin, long end) {
       for (long j = begin; j < end; ++j) {

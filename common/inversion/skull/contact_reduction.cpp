@@ -17,8 +17,6 @@ ContactReduction::ContactReduction(const CondensedOperators& operators, ModeWind
       response_(operators.num_slaves(), window.count + 1),
       before_response_(operators.num_slaves(), window.count + 1),
       columns_(new double[static_cast<std::size_t>(operators.num_slaves()) * kMaxChanges]),
-      single_(new float[static_cast<std::size_t>(response_.size())]),
-      columns_single_(new float[static_cast<std::size_t>(operators.num_slaves()) * kMaxChanges]),
       sizes_(kMaxChanges, window.count + 1) {
   for (std::vector<int>* each : {&active_, &before_, &left_, &joined_}) {
     each->reserve(static_cast<std::size_t>(operators.num_slaves()));
@@ -81,17 +79,6 @@ void ContactReduction::follow() {
   });
 }
 
-void ContactReduction::round_to_single() {
-  const auto round = [this](const Eigen::Map<const Eigen::MatrixXd>& from, float* to) {
-    Eigen::Map<Eigen::MatrixXf> out(to, from.rows(), from.cols());
-    team_.split(out.cols(), [&](long begin, long end) {
-      out.middleCols(begin, end - begin) = from.middleCols(begin, end - begin).cast<float>();
-    });
-  };
-  round(response(), single_.get());
-  round(change_columns(), columns_single_.get());
-}
-
 Status ContactReduction::activate(const contact::ActiveSet& set) {
   left_.clear();
   joined_.clear();
@@ -104,10 +91,10 @@ Status ContactReduction::activate(const contact::ActiveSet& set) {
   if (list_changes()) {
     response_.swap(before_response_);
     follow();
-  } else if (size() > 0) {
-    system_.respond(Eigen::Map<Eigen::MatrixXd>(response_.data(), size(), window_.count + 1));
+    return {};
   }
-  round_to_single();
+  if (size() == 0) return {};
+  system_.respond(Eigen::Map<Eigen::MatrixXd>(response_.data(), size(), window_.count + 1));
   return {};
 }
 
@@ -158,7 +145,7 @@ double ContactReach::along(const VecX& step, const VecX& penetration, int most) 
     closing_.segment(begin, end - begin).noalias() = -modes.middleRows(begin, end - begin) * step;
   });
   if (2 * k <= operators_.num_slaves()) {
-    reduction_.compliance().subtract(active, opening, closing_);
+    subtract_penetration(operators_, active, opening, team_, closing_);
   } else {  // of few open slaves each is the product of one column, because Phi is symmetric
     crossings_.setZero();
     for (int j = 0; j < k; ++j) crossings_[active[static_cast<std::size_t>(j)]] = opening[j];

@@ -50,11 +50,6 @@ class ContactReduction {
   // [T | f0], k x (r + 1)
   Eigen::Map<const Eigen::MatrixXd> response() const { return response_of(response_, size()); }
 
-  // The same in single precision, for sums over the slaves of what their forces do elsewhere.
-  Eigen::Map<const Eigen::MatrixXf> response_single() const {
-    return {single_.get(), size(), window_.count + 1};
-  }
-
   // How the last activate() came from the set before: Q and a, ascending, Y (k x changes) and S
   // (changes x (r + 1)). No changes: it did not.
   int changes() const { return static_cast<int>(left_.size() + joined_.size()); }
@@ -62,16 +57,10 @@ class ContactReduction {
   Eigen::Map<const Eigen::MatrixXd> change_columns() const {
     return {columns_.get(), size(), changes()};
   }
-  Eigen::Map<const Eigen::MatrixXf> change_columns_single() const {
-    return {columns_single_.get(), size(), changes()};
-  }
   auto change_sizes() const { return sizes_.topRows(changes()); }
 
   // f0 - T z, of the active slaves, N; those that pull are no solution. out: k.
   void forces_at(const VecX& z, Eigen::Ref<VecX> out) const;
-
-  // The compliance that the system sums up depths with.
-  SlaveCompliance& compliance() const { return system_.compliance(); }
 
   // D^-1 N_A^T U of the modes before the window (those a scene leaves out), k x window.first.
   // Allocates. Errors of ContactSystem::take.
@@ -88,7 +77,6 @@ class ContactReduction {
   bool list_changes();
   // response_ from before_response_.
   void follow();
-  void round_to_single();
 
   const CondensedOperators& operators_;
   ModeWindow window_;
@@ -100,8 +88,7 @@ class ContactReduction {
   // column-major.
   Eigen::MatrixXd response_, before_response_;
   std::unique_ptr<double[]> columns_;  // D_Ba, then Y
-  std::unique_ptr<float[]> single_, columns_single_;
-  Eigen::MatrixXd sizes_;  // S
+  Eigen::MatrixXd sizes_;              // S
 };
 
 // ContactReach: how far the modes may move before the linear model of a set of active slaves is
@@ -112,8 +99,7 @@ class ContactReduction {
 //
 // with T of ContactReduction. A step that ends where few slaves have changed finds contact
 // with few sets and few updates of its factor; one that goes far beyond costs ten factorisations,
-// and its end says nothing of the way. Depths are sums in single precision (slave_compliance.hpp).
-// Nothing is allocated after construction.
+// and its end says nothing of the way. Nothing is allocated after construction.
 class ContactReach {
  public:
   // Keeps references to all but the numbers. beta: penalty, N/mm. contact: false keeps every slave

@@ -210,7 +210,6 @@ ContactSystem::ContactSystem(const CondensedOperators& operators, ModeWindow win
       window_(window),
       beta_(beta),
       team_(team),
-      compliance_(operators, team),
       pressing_(operators.compliance.data(), operators.num_slaves(), 1.0 / beta, team),
       released_(operators, window, beta, team),
       modes_of_slave_(operators.slave_modes.middleCols(window.first, window.count).transpose()),
@@ -245,17 +244,10 @@ void ContactSystem::solve(const VecX& z, const VecX& free_penetration, Eigen::Re
   gather(free_penetration.data(), active_, forces.data());
   pressing_.solve(forces, work_.topLeftCorner(pressing_.work_rows(), 1));
   penetration = free_penetration;
-  compliance_.subtract(active_, forces, penetration);
-  // Of slaves of the set by construction; the sum has it up to rounding.
-  const double unsure_mm = compliance_.error_mm(active_, forces);
-  auto own = active_.begin();
-  for (int slave = 0; slave < operators_.num_slaves(); ++slave) {
-    if (own != active_.end() && *own == slave) {
-      penetration[slave] = forces[own - active_.begin()] / beta_;
-      ++own;
-    } else if (penetration[slave] > -unsure_mm) {
-      penetration[slave] = free_penetration[slave] - compliance_.at(slave, active_, forces);
-    }
+  subtract_penetration(operators_, active_, forces, team_, penetration);
+  // By construction; the sum has it up to rounding.
+  for (int j = 0; j < size(); ++j) {
+    penetration[active_[static_cast<std::size_t>(j)]] = forces[j] / beta_;
   }
 }
 

@@ -20,7 +20,6 @@
 #include "common/core/thread_team.hpp"
 #include "common/inversion/skull/mode_window.hpp"
 #include "common/inversion/skull/principal_factor.hpp"
-#include "common/inversion/skull/slave_compliance.hpp"
 #include "common/linalg/blas.hpp"
 #include "common/linalg/growing_matrix.hpp"
 #include "common/operators/condensed_operators.hpp"
@@ -107,12 +106,9 @@ class ContactSystem {
   const std::vector<int>& active() const { return active_; }  // slaves, ascending
   const contact::ActiveSet& set() const { return set_; }
 
-  // f (k, N) and P (s, mm) for modes z; free_penetration: p - L z of all slaves. The sign of P and
-  // every positive P are as in double precision; else P is off by at most
-  // SlaveCompliance::error_mm().
+  // f (k, N) and P (s, mm) for modes z; free_penetration: p - L z of all slaves.
   void solve(const VecX& z, const VecX& free_penetration, Eigen::Ref<VecX> forces,
              VecX& penetration);
-  SlaveCompliance& compliance() { return compliance_; }
   // [T f0] = (Phi_AA + I / beta)^-1 [L_A p_A], k x (r + 1).
   void respond(Eigen::Ref<Eigen::MatrixXd> out);
   // Y = D_AA^-1 [D_AQ E_a], D = Phi + I / beta, for slaves Q that are not in the set and slaves a
@@ -130,7 +126,6 @@ class ContactSystem {
   ModeWindow window_;
   double beta_;
   ThreadTeam& team_;
-  SlaveCompliance compliance_;
   PrincipalFactor pressing_;
   ReleasedSlaves released_;
   contact::ActiveSet set_;
@@ -141,8 +136,7 @@ class ContactSystem {
   linalg::GrowingVector adjoint_;
 };
 
-// penetration -= Phi_:S change for few slaves S, in double precision, shared by the team. change:
-// one per slave of S, N.
+// penetration -= Phi_:S change for slaves S, shared by the team. change: one per slave of S, N.
 void subtract_penetration(const CondensedOperators& operators, const std::vector<int>& slaves,
                           const Eigen::Ref<const VecX>& change, ThreadTeam& team,
                           VecX& penetration);

@@ -83,10 +83,6 @@ TEST_F(ModePosteriorTest, ASourceContradictsOnlyWhereTheMeanOverTheHypothesesSay
   EXPECT_GT(under_the_first, 0);
 }
 
-// What contact adds to a linear model is a sum of some tens of terms in single precision, which
-// partly cancel.
-constexpr double kSingle = 1e-5;
-
 TEST_F(ModePosteriorTest, TheLinearModelHasWhatForcesDoToTheDataWhateverTheNumberOfThreads) {
   const auto brain = operators(Boundary::kContact);
   const ModeWindow window{0, brain->num_modes()};
@@ -115,7 +111,7 @@ TEST_F(ModePosteriorTest, TheLinearModelHasWhatForcesDoToTheDataWhateverTheNumbe
       const Eigen::MatrixXd expected =
           free_body - sampled.contact(model.active()) * model.response().leftCols(window.count);
       ASSERT_GT((expected - free_body).norm(), 0.1 * expected.norm()) << "the test shows nothing";
-      EXPECT_LT((found - expected).norm(), kSingle * expected.norm());
+      EXPECT_LT((found - expected).norm(), 1e-12 * expected.norm());
       first = found;
     }
     EXPECT_EQ(found, first) << threads;
@@ -150,10 +146,10 @@ TEST_F(ModePosteriorTest, ALinearModelThatFollowsTheSetBeforeIsThatOfItsOwn) {
     const auto gram = own.gram(), found = following.gram();
     const Eigen::MatrixXd expected = gram.triangularView<Eigen::Lower>();
     const Eigen::MatrixXd difference = found.triangularView<Eigen::Lower>();
-    EXPECT_LT((difference - expected).norm(), kSingle * expected.norm());
-    EXPECT_LT((following.jacobian() - own.jacobian()).norm(), kSingle * own.jacobian().norm());
+    EXPECT_LT((difference - expected).norm(), 1e-10 * expected.norm());
+    EXPECT_LT((following.jacobian() - own.jacobian()).norm(), 1e-10 * own.jacobian().norm());
     EXPECT_LT((following.right_hand_side() - own.right_hand_side()).norm(),
-              kSingle * own.right_hand_side().norm());
+              1e-10 * own.right_hand_side().norm());
     for (int i = 0; i < 3; ++i) {
       char& one = set[static_cast<std::size_t>(random.uniform() * slaves)];
       one = one ? 0 : 1;

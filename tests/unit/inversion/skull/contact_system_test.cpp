@@ -157,11 +157,7 @@ void expect_answers(const CondensedOperators& brain, ContactSystem& system,
   VecX found_forces(k), found_depth(kSlaves);
   system.solve(z, free, found_forces, found_depth);
   EXPECT_LT((found_forces - forces).norm(), 1e-10 * (1.0 + forces.norm()));
-  const double unsure_mm = system.compliance().error_mm(active, forces);
-  for (int i = 0; i < kSlaves; ++i) {
-    const double tolerance = depth[i] > 0.0 ? 1e-10 * (1.0 + depth.norm()) : unsure_mm;
-    EXPECT_NEAR(found_depth[i], depth[i], tolerance) << i;
-  }
+  EXPECT_LT((found_depth - depth).norm(), 1e-10 * (1.0 + depth.norm()));
 
   MatrixXd loads(k, window.count + 1);
   loads << modes(active, Eigen::all), brain.initial_penetration_mm(active);
