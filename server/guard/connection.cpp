@@ -15,13 +15,6 @@ constexpr std::uint64_t kHeartbeat = 128;
 
 }  // namespace
 
-bool Allowance::left(TimePoint now) {
-  const double seconds = std::chrono::duration<double>(now - at_).count();
-  left_ = std::min(burst_, left_ + rate_ * seconds);
-  at_ = now;
-  return left_ > 0.0;
-}
-
 Connection::~Connection() {
   if (peer >= 0) ::close(peer);
   if (inner >= 0) ::close(inner);

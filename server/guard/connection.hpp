@@ -13,6 +13,7 @@
 #include <string>
 #include <vector>
 
+#include "server/guard/token_bucket.hpp"
 #include "server/guard/zmtp_stream.hpp"
 
 namespace brainshift::server {
@@ -39,28 +40,19 @@ struct Account {
   std::atomic<bool> throttled{false};  // it is not read for now
 };
 
-// How many bytes a connection may send on: a token bucket.
-class Allowance {
- public:
-  using TimePoint = std::chrono::steady_clock::time_point;
-
-  // Bytes a second, and bytes at once.
-  Allowance(double rate, double burst, TimePoint now)
-      : rate_(rate), burst_(burst), left_(burst), at_(now) {}
-  // Whether anything is left at `now`.
-  bool left(TimePoint now);
-  void spend(std::size_t bytes) { left_ -= static_cast<double>(bytes); }
-
- private:
-  double rate_, burst_, left_;
-  TimePoint at_;
-};
+// Bytes a second that a connection is read at, and at once: of the largest observations thirty, and
+// two.
+inline constexpr double kBytesPerSecond = 64.0 * (1u << 20), kBytesAtOnce = 4.0 * (1u << 20);
 
 struct Connection {
   using TimePoint = std::chrono::steady_clock::time_point;
 
-  Connection(const ZmtpStream::Bounds& bounds, const Allowance& given, TimePoint now)
-      : stream(bounds), allowance(given), opened(now), forgiven(now), moved(now) {}
+  Connection(const ZmtpStream::Bounds& bounds, TimePoint now)
+      : stream(bounds),
+        to_read(kBytesPerSecond, kBytesAtOnce, now),
+        opened(now),
+        forgiven(now),
+        moved(now) {}
   ~Connection();  // closes both sockets
   Connection(const Connection&) = delete;
   Connection& operator=(const Connection&) = delete;
@@ -74,7 +66,7 @@ struct Connection {
   std::string name;  // of the inner socket
   Lane up, down;     // to libzmq, to the peer
   ZmtpStream stream;
-  Allowance allowance;
+  TokenBucket to_read;  // bytes
   std::shared_ptr<Account> account = std::make_shared<Account>();
   std::uint64_t held = 0;     // by libzmq
   std::uint64_t waiting = 0;  // messages that libzmq holds whole; with CURVE parts

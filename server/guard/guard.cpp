@@ -139,11 +139,9 @@ struct Guard::Impl {
 
   void open(int peer) {
     std::unique_ptr<Connection> connection;
-    const auto now = Clock::now();
     try {
       connection = std::make_unique<Connection>(
-          ZmtpStream::Bounds{.message_bytes = options.max_message_bytes + kWrapping},
-          Allowance(options.bytes_per_s, options.burst_bytes, now), now);
+          ZmtpStream::Bounds{.message_bytes = options.max_message_bytes + kWrapping}, Clock::now());
     } catch (...) {
       ::close(peer);
       throw;
@@ -199,7 +197,7 @@ struct Guard::Impl {
         const auto now = Clock::now();
         held += connection.settle(now);
         more =
-            connection.allowance.left(now) &&
+            connection.to_read.has_one(now) &&
             connection.held <= options.max_message_bytes + kSlack &&
             connection.waiting <= (connection.stream.encrypted() ? kMaxWaitingParts : kMaxWaiting);
         connection.account->throttled = !more;
@@ -216,7 +214,7 @@ struct Guard::Impl {
       if (got == 0) return gone();
       lane.begin = 0;
       lane.end = static_cast<std::size_t>(got);
-      if (up) connection.allowance.spend(lane.end);
+      if (up) connection.to_read.spend(static_cast<double>(lane.end));
       if (up && !within_bounds(connection)) return false;
     }
     return true;

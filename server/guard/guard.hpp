@@ -44,9 +44,7 @@ namespace brainshift::server {
 
 struct GuardOptions {
   std::size_t max_message_bytes = 16u << 20;
-  std::size_t held_bytes = 48u << 20;      // taken as two messages when that is more
-  double bytes_per_s = 64.0 * (1u << 20);  // 30 of the largest observations
-  double burst_bytes = 4.0 * (1u << 20);   // two of them
+  std::size_t held_bytes = 48u << 20;  // taken as two messages when that is more
   int max_connections = 256;
   std::chrono::milliseconds patience{30000};
 };

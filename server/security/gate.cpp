@@ -38,15 +38,6 @@ Need need_of(const wire::Frame& request) {
 
 }  // namespace
 
-bool TokenBucket::take(TimePoint now) {
-  const double elapsed_s = std::chrono::duration<double>(now - filled_).count();
-  tokens_ = std::min(burst_, tokens_ + per_second_ * std::max(0.0, elapsed_s));
-  filled_ = std::max(filled_, now);
-  if (tokens_ < 1.0) return false;
-  tokens_ -= 1.0;
-  return true;
-}
-
 // A peer that repeats itself fills no log: the 1st, 2nd, 4th, 8th ... refusal of a kind is told.
 tl::unexpected<Error> Gate::refuse(std::uint64_t& counter, ErrorCode code,
                                    const std::string& sentence) {

@@ -23,6 +23,7 @@
 #include "common/core/error.hpp"
 #include "common/io/config/role.hpp"
 #include "common/wire/frame.hpp"
+#include "server/guard/token_bucket.hpp"
 
 namespace brainshift::server {
 
@@ -34,25 +35,6 @@ struct ServerKeys {
   std::string secret_key;             // the daemon's, Z85
   KeyNames names;                     // of the clients, by public key
   std::map<std::string, Role> roles;  // of the clients, by name
-};
-
-// At most `burst` at once, and `per_second` in the long run. A bucket begins full.
-class TokenBucket {
- public:
-  using TimePoint = std::chrono::steady_clock::time_point;
-
-  // Precondition: burst >= 1, per_second >= 0.
-  TokenBucket(double per_second, double burst, TimePoint now)
-      : per_second_(per_second), burst_(burst), tokens_(burst), filled_(now) {}
-
-  // True and one token less, or false when none is left. `now` never goes back.
-  bool take(TimePoint now);
-
- private:
-  double per_second_;
-  double burst_;
-  double tokens_;
-  TimePoint filled_;
 };
 
 // Per key; without keys, per connection. Observations: six times five sources of 60 Hz, for replays
