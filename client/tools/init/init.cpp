@@ -10,24 +10,19 @@
 #include <map>
 #include <numbers>
 #include <optional>
-#include <set>
 #include <utility>
 
+#include "client/tools/init/given_tumour.hpp"
 #include "client/tools/init/position.hpp"
 #include "common/anatomy/brain_labels.hpp"
 #include "common/anatomy/given_inputs.hpp"
 #include "common/core/text.hpp"
 #include "common/geometry/mask.hpp"
 #include "common/io/config/config_file.hpp"
-#include "common/io/dicom/dicom_segmentation.hpp"
 #include "common/io/dicom/dicom_series.hpp"
-#include "common/io/dicom/dicom_structures.hpp"
-#include "common/io/dicom/filled_contours.hpp"
 #include "common/io/fields/field_files.hpp"
-#include "common/io/files/csv_numbers.hpp"
 #include "common/io/files/file_access.hpp"
 #include "common/io/files/output_path.hpp"
-#include "common/io/geometry/label_map_file.hpp"
 #include "common/io/geometry/label_names.hpp"
 
 namespace brainshift::client {
@@ -88,156 +83,6 @@ Status check_options(const InitOptions& options) {
   return io::check_output_file("--out", options.out);
 }
 
-// ---- the tumour's labels ----
-
-std::set<int> labels_in(const VoxelImage& image) {
-  std::set<int> labels;
-  for (const float v : image.values) {
-    if (std::isfinite(v) && v != 0.0F) labels.insert(static_cast<int>(std::lround(v)));
-  }
-  return labels;
-}
-
-struct TumourChoice {
-  std::vector<int> labels = {1};
-  std::string why;
-};
-
-Result<TumourChoice> named_labels(const InitOptions& options, const io::LabelNames& names) {
-  TumourChoice choice{{}, "--tumour-label"};
-  for (const std::string_view word : io::cells_of(options.tumour_label)) {
-    double number = 0.0;
-    const bool whole =
-        io::parse_number(word, number) && number == std::round(number) && std::abs(number) < 1e9;
-    const auto is_it = [&](const auto& name) {
-      return io::lower_case(name.second) == io::lower_case(word);
-    };
-    const auto found = std::find_if(names.begin(), names.end(), is_it);
-    if (const auto times = std::count_if(names.begin(), names.end(), is_it); !whole && times > 1) {
-      return invalid(fmt::format("--tumour-label: {}: {} has {} of this name: give the number",
-                                 in_quotes(word), options.tumour.string(), times));
-    }
-    if (!whole && found == names.end()) {
-      std::string known;
-      for (const auto& [label, name] : names) {
-        known += (known.empty() ? "" : ", ") + in_quotes(name);
-      }
-      return invalid(fmt::format("--tumour-label: {}: must be a whole number, or a name of {} ({})",
-                                 in_quotes(word), options.tumour.string(),
-                                 known.empty() ? "there is none" : known));
-    }
-    choice.labels.push_back(whole ? static_cast<int>(number) : found->first);
-  }
-  return choice;
-}
-
-Result<TumourChoice> tumour_labels(const InitOptions& options, const VoxelImage& image) {
-  if (!options.tumour_label.empty()) {
-    const auto names = io::label_names_beside(options.tumour);
-    if (!names) return tl::unexpected(names.error());
-    return named_labels(options, *names);
-  }
-  const std::set<int> there = labels_in(image);
-  if (there.size() <= 1) {
-    return TumourChoice{{there.empty() ? 1 : *there.begin()}, "the only label"};
-  }
-  const bool brats = *there.begin() >= 1 && *there.rbegin() <= 4 && there.count(2) != 0 &&
-                     there.count(3) + there.count(4) != 0;
-  if (brats) {
-    TumourChoice choice{{}, "labels as of BraTS: all but 2, oedema"};
-    std::copy_if(there.begin(), there.end(), std::back_inserter(choice.labels),
-                 [](int label) { return label != 2; });
-    return choice;
-  }
-  // Not whole: a soft mask, which anatomy::tumour_foci judges.
-  const bool whole = std::all_of(image.values.begin(), image.values.end(),
-                                 [](float v) { return v == std::round(v); });
-  if (!whole) return TumourChoice{{1}, "a soft mask"};
-  return invalid(fmt::format("{}: has several labels; name the tumour's by --tumour-label: {}",
-                             options.tumour.string(), anatomy::listed_labels(image)));
-}
-
-// Of a DICOM segmentation: the only segment, or those that were named.
-Result<TumourChoice> tumour_segments(const InitOptions& options, const io::DicomSegmentation& seg) {
-  if (options.tumour_label.empty() && seg.names.size() == 1) {
-    return TumourChoice{{seg.names.begin()->first}, "the only segment"};
-  }
-  std::string list;
-  for (const auto& [number, name] : seg.names) {
-    list += fmt::format("{}{} {}", list.empty() ? "" : ", ", number, in_quotes(name));
-  }
-  if (options.tumour_label.empty()) {
-    return invalid(fmt::format("{}: has several segments; name the tumour's by --tumour-label: {}",
-                               options.tumour.string(), list));
-  }
-  auto choice = named_labels(options, seg.names);
-  for (const int number : choice ? choice->labels : std::vector<int>()) {
-    if (seg.names.count(number) != 0) continue;
-    return invalid(fmt::format("--tumour-label: {}: {} has no such segment; it has {}", number,
-                               options.tumour.string(), list));
-  }
-  return choice;
-}
-
-// Number, name and volume of each structure, or why it has none.
-std::string listed_structures(const io::DicomStructures& set, const VoxelImage& grid) {
-  std::string list;
-  for (const io::DicomStructure& one : set.structures) {
-    const auto mm3 = one.defect.empty() ? io::contours_volume_mm3(one.contours, grid)
-                                        : Result<double>(invalid(one.defect));
-    list += fmt::format("{}{} {} ({})", list.empty() ? "" : ", ", one.number, in_quotes(one.name),
-                        mm3 ? fmt::format("{:.2f} cc", *mm3 / kMm3PerCc) : mm3.error().message);
-  }
-  return list;
-}
-
-// Of a DICOM structure set: the only structure, or those that were named. grid: that of the MRI.
-Result<TumourChoice> tumour_structures(const InitOptions& options, const io::DicomStructures& set,
-                                       const VoxelImage& grid) {
-  if (options.tumour_label.empty() && set.structures.size() == 1) {
-    return TumourChoice{{set.structures.front().number}, "the only structure"};
-  }
-  if (options.tumour_label.empty()) {
-    return invalid(
-        fmt::format("{}: has several structures; name the tumour's by --tumour-label: {}",
-                    options.tumour.string(), listed_structures(set, grid)));
-  }
-  io::LabelNames names;
-  for (const io::DicomStructure& one : set.structures) names[one.number] = one.name;
-  auto choice = named_labels(options, names);
-  for (const int number : choice ? choice->labels : std::vector<int>()) {
-    if (names.count(number) != 0) continue;
-    return invalid(fmt::format("--tumour-label: {}: {} has no such structure; it has {}", number,
-                               options.tumour.string(), listed_structures(set, grid)));
-  }
-  return choice;
-}
-
-// The structures as labels by their numbers on the grid; where several lie, the last one chosen.
-Result<VoxelImage> structure_map(const io::DicomStructures& set, const std::vector<int>& numbers,
-                                 const VoxelImage& grid, std::vector<std::string>& notes) {
-  VoxelImage map;
-  map.dims = grid.dims, map.T_ras_voxel = grid.T_ras_voxel;
-  map.values.assign(grid.num_voxels(), 0.0F);
-  for (const int number : numbers) {
-    const auto one = std::find_if(set.structures.begin(), set.structures.end(),
-                                  [&](const auto& other) { return other.number == number; });
-    const std::string name = fmt::format("structure {} {}", number, in_quotes(one->name));
-    if (!one->defect.empty()) {
-      return invalid(fmt::format("{}: {}: closed planar contours are needed", name, one->defect));
-    }
-    const auto filled = io::fill_contours(one->contours, grid);
-    if (!filled) return fail(filled.error().code, name + ": " + filled.error().message);
-    for (std::size_t v = 0; v < map.values.size(); ++v) {
-      if (filled->mask.values[v] > 0.0F) map.values[v] = static_cast<float>(number);
-    }
-    notes.push_back(fmt::format("{}, from {} contours in {} planes {:.2f} mm apart", name,
-                                one->contours.size(), filled->planes, filled->spacing_mm));
-    for (const std::string& note : filled->notes) notes.push_back(note);
-  }
-  return map;
-}
-
 // ---- the case as text ----
 
 std::string list_text(const Vec3& x, int digits) {
@@ -273,7 +118,7 @@ std::string comment(const std::string& sentence, std::size_t indent) {
 struct Draft {
   InitOptions options;
   fs::path mri, brain, tumour_file;
-  TumourChoice tumour;
+  std::vector<int> labels;                // the tumour's
   std::optional<io::DicomSeries> series;  // of a DICOM MRI
   VoxelImage grid;                        // of the MRI, without values
   std::optional<VoxelImage> segments;     // of a DICOM segmentation or structure set
@@ -286,7 +131,7 @@ struct Draft {
 std::string case_text(const Draft& draft) {
   const bool segment = !draft.options.tumour_segment.empty();
   std::string labels;
-  for (const int label : draft.tumour.labels) {
+  for (const int label : draft.labels) {
     labels += fmt::format("{}{}", labels.empty() ? "" : ", ", label);
   }
   const Vec3 axis = std::abs(draft.opening.outward.y()) > 0.8 ? Vec3::UnitZ() : Vec3::UnitY();
@@ -362,76 +207,25 @@ std::string about_series(const io::DicomSeries& series) {
   return text + ".";
 }
 
-// A tumour from DICOM, and what to say of it.
-struct DicomTumour {
-  VoxelImage map;
-  TumourChoice choice;
-  std::vector<std::string> notes;
-};
-
-Result<DicomTumour> tumour_of_structures(const Draft& draft) {
-  const fs::path& file = draft.options.tumour;
-  const auto set = io::read_dicom_structures(file);
-  if (!set) return tl::unexpected(set.error());
-  DicomTumour tumour;
-  if (draft.series && !set->frame_of_reference.empty() &&
-      !draft.series->frame_of_reference.empty() &&
-      set->frame_of_reference != draft.series->frame_of_reference) {
-    return invalid(file.string() +
-                   ": was drawn in another frame of reference (0020,0052) than --mri: its places "
-                   "are not those of this MRI");
-  }
-  auto choice = tumour_structures(draft.options, *set, draft.grid);
-  if (!choice) return tl::unexpected(choice.error());
-  tumour.choice = std::move(*choice);
-  auto map = structure_map(*set, tumour.choice.labels, draft.grid, tumour.notes);
-  if (!map) return io::file_error(file, map.error());
-  if (draft.series && !set->series.empty() && set->series != draft.series->series) {
-    tumour.notes.emplace_back("drawn on another series in the MRI's frame of reference");
-  }
-  tumour.map = std::move(*map);
-  return tumour;
-}
-
-Result<DicomTumour> tumour_of_segments(const Draft& draft) {
-  const auto seg = io::read_dicom_segmentation(draft.options.tumour);
-  if (!seg) return tl::unexpected(seg.error());
-  auto choice = tumour_segments(draft.options, *seg);
-  if (!choice) return tl::unexpected(choice.error());
-  return DicomTumour{io::label_map(*seg, choice->labels), std::move(*choice), {}};
-}
-
 Status guess_tumour(Draft& draft, const VoxelImage& brain) {
   const InitOptions& options = draft.options;
-  std::vector<std::string> about;
-  Result<VoxelImage> image = VoxelImage();
-  Result<TumourChoice> choice = TumourChoice();
-  if (io::is_dicom(options.tumour)) {
-    auto tumour = io::is_dicom_structures(options.tumour) ? tumour_of_structures(draft)
-                                                          : tumour_of_segments(draft);
-    if (!tumour) return tl::unexpected(tumour.error());
-    draft.tumour_file = beside(options.out, "-tumour.nii.gz");
-    draft.segments = tumour->map;
-    image = std::move(tumour->map), choice = std::move(tumour->choice);
-    about = std::move(tumour->notes);
-  } else {
-    image = io::read_label_map(options.tumour, {options.tumour_segment, 1});
-    if (image) choice = tumour_labels(options, *image);
-  }
-  if (!image) return tl::unexpected(image.error());
-  if (!choice) return tl::unexpected(choice.error());
-  draft.tumour = *choice;
+  auto given = read_tumour(options, draft.grid, draft.series);
+  if (!given) return tl::unexpected(given.error());
+  draft.labels = given->labels;
   anatomy::Notes notes;
   const auto foci =
-      anatomy::tumour_foci(*image, choice->labels, 0.0, options.tumour.string(), &notes);
+      anatomy::tumour_foci(given->map, given->labels, 0.0, options.tumour.string(), &notes);
   if (!foci) return tl::unexpected(foci.error());
   double mm3 = 0.0;
   for (const anatomy::Focus& focus : *foci) mm3 += focus.volume_mm3;
-  draft.about_tumour = fmt::format("{:.2f} cc ({}).", mm3 / kMm3PerCc,
-                                   options.tumour_segment.empty() ? choice->why : "the segment");
-  for (const std::string& note : about) draft.about_tumour += " " + note + ".";
+  draft.about_tumour = fmt::format("{:.2f} cc ({}).", mm3 / kMm3PerCc, given->why);
+  for (const std::string& note : given->notes) draft.about_tumour += " " + note + ".";
   for (const std::string& note : notes) {
     draft.about_tumour += " " + note.substr(options.tumour.string().size() + 2) + ".";
+  }
+  if (given->from_dicom) {
+    draft.tumour_file = beside(options.out, "-tumour.nii.gz");
+    draft.segments = std::move(given->map);
   }
   const Vec3 centre = foci->front().centre;
   const double ball_mm = 2.0 * std::cbrt(0.75 * foci->front().volume_mm3 / std::numbers::pi);

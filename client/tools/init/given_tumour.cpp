@@ -1,0 +1,212 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "client/tools/init/given_tumour.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <functional>
+#include <set>
+#include <string_view>
+#include <utility>
+
+#include "common/anatomy/given_inputs.hpp"
+#include "common/core/text.hpp"
+#include "common/io/dicom/dicom_segmentation.hpp"
+#include "common/io/dicom/dicom_structures.hpp"
+#include "common/io/dicom/filled_contours.hpp"
+#include "common/io/files/csv_numbers.hpp"
+#include "common/io/files/file_access.hpp"
+#include "common/io/geometry/label_map_file.hpp"
+#include "common/io/geometry/label_names.hpp"
+
+namespace brainshift::client {
+namespace {
+
+std::set<int> labels_in(const VoxelImage& image) {
+  std::set<int> labels;
+  for (const float v : image.values) {
+    if (std::isfinite(v) && v != 0.0F) labels.insert(static_cast<int>(std::lround(v)));
+  }
+  return labels;
+}
+
+struct TumourChoice {
+  std::vector<int> labels = {1};
+  std::string why;
+};
+
+Result<TumourChoice> named_labels(const InitOptions& options, const io::LabelNames& names) {
+  TumourChoice choice{{}, "--tumour-label"};
+  for (const std::string_view word : io::cells_of(options.tumour_label)) {
+    double number = 0.0;
+    const bool whole =
+        io::parse_number(word, number) && number == std::round(number) && std::abs(number) < 1e9;
+    const auto is_it = [&](const auto& name) {
+      return io::lower_case(name.second) == io::lower_case(word);
+    };
+    const auto found = std::find_if(names.begin(), names.end(), is_it);
+    if (const auto times = std::count_if(names.begin(), names.end(), is_it); !whole && times > 1) {
+      return invalid(fmt::format("--tumour-label: {}: {} has {} of this name: give the number",
+                                 in_quotes(word), options.tumour.string(), times));
+    }
+    if (!whole && found == names.end()) {
+      std::string known;
+      for (const auto& [label, name] : names) {
+        known += (known.empty() ? "" : ", ") + in_quotes(name);
+      }
+      return invalid(fmt::format("--tumour-label: {}: must be a whole number, or a name of {} ({})",
+                                 in_quotes(word), options.tumour.string(),
+                                 known.empty() ? "there is none" : known));
+    }
+    choice.labels.push_back(whole ? static_cast<int>(number) : found->first);
+  }
+  return choice;
+}
+
+Result<TumourChoice> tumour_labels(const InitOptions& options, const VoxelImage& image) {
+  if (!options.tumour_label.empty()) {
+    const auto names = io::label_names_beside(options.tumour);
+    if (!names) return tl::unexpected(names.error());
+    return named_labels(options, *names);
+  }
+  const std::set<int> there = labels_in(image);
+  if (there.size() <= 1) {
+    return TumourChoice{{there.empty() ? 1 : *there.begin()}, "the only label"};
+  }
+  const bool brats = *there.begin() >= 1 && *there.rbegin() <= 4 && there.count(2) != 0 &&
+                     there.count(3) + there.count(4) != 0;
+  if (brats) {
+    TumourChoice choice{{}, "labels as of BraTS: all but 2, oedema"};
+    std::copy_if(there.begin(), there.end(), std::back_inserter(choice.labels),
+                 [](int label) { return label != 2; });
+    return choice;
+  }
+  // Not whole: a soft mask, which anatomy::tumour_foci judges.
+  const bool whole = std::all_of(image.values.begin(), image.values.end(),
+                                 [](float v) { return v == std::round(v); });
+  if (!whole) return TumourChoice{{1}, "a soft mask"};
+  return invalid(fmt::format("{}: has several labels; name the tumour's by --tumour-label: {}",
+                             options.tumour.string(), anatomy::listed_labels(image)));
+}
+
+// The only one of DICOM's segments or structures (`what`), or those that were named. list: all of
+// them, for a refusal.
+Result<TumourChoice> only_or_named(const InitOptions& options, const io::LabelNames& names,
+                                   std::string_view what,
+                                   const std::function<std::string()>& list) {
+  if (options.tumour_label.empty() && names.size() == 1) {
+    return TumourChoice{{names.begin()->first}, fmt::format("the only {}", what)};
+  }
+  if (options.tumour_label.empty()) {
+    return invalid(fmt::format("{}: has several {}s; name the tumour's by --tumour-label: {}",
+                               options.tumour.string(), what, list()));
+  }
+  auto choice = named_labels(options, names);
+  for (const int number : choice ? choice->labels : std::vector<int>()) {
+    if (names.count(number) != 0) continue;
+    return invalid(fmt::format("--tumour-label: {}: {} has no such {}; it has {}", number,
+                               options.tumour.string(), what, list()));
+  }
+  return choice;
+}
+
+std::string listed_segments(const io::LabelNames& names) {
+  std::string list;
+  for (const auto& [number, name] : names) {
+    list += fmt::format("{}{} {}", list.empty() ? "" : ", ", number, in_quotes(name));
+  }
+  return list;
+}
+
+// Number, name and volume of each structure, or why it has none.
+std::string listed_structures(const io::DicomStructures& set, const VoxelImage& grid) {
+  std::string list;
+  for (const io::DicomStructure& one : set.structures) {
+    const auto mm3 = one.defect.empty() ? io::contours_volume_mm3(one.contours, grid)
+                                        : Result<double>(invalid(one.defect));
+    list += fmt::format("{}{} {} ({})", list.empty() ? "" : ", ", one.number, in_quotes(one.name),
+                        mm3 ? fmt::format("{:.2f} cc", 1e-3 * *mm3) : mm3.error().message);
+  }
+  return list;
+}
+
+// The structures as labels by their numbers on the grid; where several lie, the last one chosen.
+Result<VoxelImage> structure_map(const io::DicomStructures& set, const std::vector<int>& numbers,
+                                 const VoxelImage& grid, std::vector<std::string>& notes) {
+  VoxelImage map;
+  map.dims = grid.dims, map.T_ras_voxel = grid.T_ras_voxel;
+  map.values.assign(grid.num_voxels(), 0.0F);
+  for (const int number : numbers) {
+    const auto one = std::find_if(set.structures.begin(), set.structures.end(),
+                                  [&](const auto& other) { return other.number == number; });
+    const std::string name = fmt::format("structure {} {}", number, in_quotes(one->name));
+    if (!one->defect.empty()) {
+      return invalid(fmt::format("{}: {}: closed planar contours are needed", name, one->defect));
+    }
+    const auto filled = io::fill_contours(one->contours, grid);
+    if (!filled) return fail(filled.error().code, name + ": " + filled.error().message);
+    for (std::size_t v = 0; v < map.values.size(); ++v) {
+      if (filled->mask.values[v] > 0.0F) map.values[v] = static_cast<float>(number);
+    }
+    notes.push_back(fmt::format("{}, from {} contours in {} planes {:.2f} mm apart", name,
+                                one->contours.size(), filled->planes, filled->spacing_mm));
+    for (const std::string& note : filled->notes) notes.push_back(note);
+  }
+  return map;
+}
+
+Result<GivenTumour> from_structures(const InitOptions& options, const VoxelImage& grid,
+                                    const std::optional<io::DicomSeries>& series) {
+  const auto set = io::read_dicom_structures(options.tumour);
+  if (!set) return tl::unexpected(set.error());
+  if (series && !set->frame_of_reference.empty() && !series->frame_of_reference.empty() &&
+      set->frame_of_reference != series->frame_of_reference) {
+    return invalid(options.tumour.string() +
+                   ": was drawn in another frame of reference (0020,0052) than --mri: its places "
+                   "are not those of this MRI");
+  }
+  io::LabelNames names;
+  for (const io::DicomStructure& one : set->structures) names[one.number] = one.name;
+  const auto choice =
+      only_or_named(options, names, "structure", [&] { return listed_structures(*set, grid); });
+  if (!choice) return tl::unexpected(choice.error());
+  GivenTumour tumour{{}, choice->labels, choice->why, {}, true};
+  auto map = structure_map(*set, choice->labels, grid, tumour.notes);
+  if (!map) return io::file_error(options.tumour, map.error());
+  if (series && !set->series.empty() && set->series != series->series) {
+    tumour.notes.emplace_back("drawn on another series in the MRI's frame of reference");
+  }
+  tumour.map = std::move(*map);
+  return tumour;
+}
+
+Result<GivenTumour> from_segments(const InitOptions& options) {
+  const auto seg = io::read_dicom_segmentation(options.tumour);
+  if (!seg) return tl::unexpected(seg.error());
+  const auto choice =
+      only_or_named(options, seg->names, "segment", [&] { return listed_segments(seg->names); });
+  if (!choice) return tl::unexpected(choice.error());
+  return GivenTumour{io::label_map(*seg, choice->labels), choice->labels, choice->why, {}, true};
+}
+
+}  // namespace
+
+Result<GivenTumour> read_tumour(const InitOptions& options, const VoxelImage& grid,
+                                const std::optional<io::DicomSeries>& series) {
+  if (io::is_dicom(options.tumour)) {
+    return io::is_dicom_structures(options.tumour) ? from_structures(options, grid, series)
+                                                   : from_segments(options);
+  }
+  auto map = io::read_label_map(options.tumour, {options.tumour_segment, 1});
+  if (!map) return tl::unexpected(map.error());
+  const auto choice = tumour_labels(options, *map);
+  if (!choice) return tl::unexpected(choice.error());
+  return GivenTumour{std::move(*map),
+                     choice->labels,
+                     options.tumour_segment.empty() ? choice->why : "the segment",
+                     {},
+                     false};
+}
+
+}  // namespace brainshift::client

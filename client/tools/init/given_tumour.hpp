@@ -1,0 +1,38 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// The tumour as a hospital has it, as a label map, and which of its labels are the tumour:
+//
+//   label map            the only label; BraTS's (1, 2 and 3 or 4) all but 2, oedema; a soft mask;
+//                        else those of --tumour-label, numbers or names of the table beside it
+//   .seg.nrrd            the segment of --tumour-segment, or the only one
+//   DICOM SEG            the only segment, or those of --tumour-label, by number or name
+//   DICOM RTSTRUCT       the same of its structures, whose contours are filled on the MRI's grid
+//                        (io/dicom/filled_contours.hpp)
+#pragma once
+
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "client/tools/init/init.hpp"
+#include "common/core/error.hpp"
+#include "common/core/mesh.hpp"
+#include "common/io/dicom/dicom_series.hpp"
+
+namespace brainshift::client {
+
+struct GivenTumour {
+  VoxelImage map;           // labels as numbers; of DICOM those of segments or structures
+  std::vector<int> labels;  // the tumour's
+  std::string why;          // these, as words
+  std::vector<std::string> notes;
+  bool from_dicom = false;  // no file holds `map` yet
+};
+
+// grid: of the MRI. series: of an MRI from DICOM, in whose frame of reference a structure set must
+// have been drawn. kInvalidArgument: labels that are not there (those that are, are listed with
+// their volumes), several and none chosen, another frame of reference. Errors of the readers and of
+// io::fill_contours.
+Result<GivenTumour> read_tumour(const InitOptions& options, const VoxelImage& grid,
+                                const std::optional<io::DicomSeries>& series);
+
+}  // namespace brainshift::client
