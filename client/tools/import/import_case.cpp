@@ -86,6 +86,22 @@ Status write_surgery(const std::filesystem::path& path, const io::SurgeryMeta& m
   return status;
 }
 
+Status check_error_place(const fs::path& case_file, const fs::path& model,
+                         const std::optional<Vec3>& target) {
+  const int given = int{!case_file.empty()} + int{!model.empty()} + int{target.has_value()};
+  if (given != 1) {
+    return invalid(
+        fmt::format("exactly one of --model, --case and --target is required, {} given", given));
+  }
+  if (target && !target->allFinite()) return invalid("--target is not finite");
+  return {};
+}
+
+std::string error_place(const std::optional<Vec3>& target) {
+  if (!target) return "the tumour";
+  return fmt::format("({:.1f}, {:.1f}, {:.1f})", target->x(), target->y(), target->z());
+}
+
 FiducialReport describe(const registration::FiducialRegistration& fit, bool matched,
                         const Vec3& target) {
   FiducialReport report;

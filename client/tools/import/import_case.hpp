@@ -4,6 +4,7 @@
 #pragma once
 
 #include <filesystem>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -53,6 +54,13 @@ Status check_new(const std::filesystem::path& out);
 // kWriteFailed; leaves nothing behind then.
 Status write_surgery(const std::filesystem::path& path, const io::SurgeryMeta& meta,
                      const std::vector<Observation>& observations);
+
+// Where the error of a registration is told: exactly one of case file, model and point.
+// kInvalidArgument, also for a point that is not finite.
+Status check_error_place(const std::filesystem::path& case_file, const std::filesystem::path& model,
+                         const std::optional<Vec3>& target);
+// Its name: "the tumour", or the point.
+std::string error_place(const std::optional<Vec3>& target);
 
 // What a user should know about a registration by fiducials before relying on it.
 struct FiducialReport {

@@ -27,13 +27,8 @@ Status check_register(const RegisterOptions& options) {
     return invalid("--ras is required: where the fiducials lie in the image");
   }
   if (options.out.empty()) return invalid("--out is required");
-  const int targets = int{!options.case_file.empty()} + int{!options.model.empty()} +
-                      int{options.target.has_value()};
-  if (targets != 1) {
-    return invalid(
-        fmt::format("exactly one of --model, --case and --target is required, {} given", targets));
-  }
-  if (options.target && !options.target->allFinite()) return invalid("--target is not finite");
+  Status place = check_error_place(options.case_file, options.model, options.target);
+  if (!place) return place;
   if (options.recording.empty() && !options.holds.empty()) {
     return invalid("--holds is for a --recording");
   }
@@ -187,14 +182,10 @@ Result<Fit> fit_fiducials(const RegisterOptions& options, RegisterReport& report
 
 Result<Vec3> target_of(const RegisterOptions& options, const Progress& progress,
                        RegisterReport& report) {
-  if (options.target) {
-    report.target = fmt::format("({:.1f}, {:.1f}, {:.1f})", options.target->x(),
-                                options.target->y(), options.target->z());
-    return *options.target;
-  }
+  report.target = error_place(options.target);
+  if (options.target) return *options.target;
   const auto known = load_import_case(options.case_file, options.model, progress);
   if (!known) return tl::unexpected(known.error());
-  report.target = "the tumour";
   return known->tumour_centroid();
 }
 

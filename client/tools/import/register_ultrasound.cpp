@@ -10,6 +10,7 @@
 
 #include "client/tools/import/import_case.hpp"
 #include "client/tools/import/register_picture.hpp"
+#include "common/anatomy/given_inputs.hpp"
 #include "common/core/small_matrices.hpp"
 #include "common/geometry/closest_point.hpp"
 #include "common/geometry/distance_volume.hpp"
@@ -33,13 +34,8 @@ Status check_ultrasound_options(const UltrasoundRegisterOptions& options) {
         std::pair{"--registration", options.registration}, std::pair{"--out", options.out}}) {
     if (path.empty()) return invalid(std::string(name) + " is required with --ultrasound");
   }
-  const int targets = int{!options.case_file.empty()} + int{!options.model.empty()} +
-                      int{options.target.has_value()};
-  if (targets != 1) {
-    return invalid(
-        fmt::format("exactly one of --model, --case and --target is required, {} given", targets));
-  }
-  if (options.target && !options.target->allFinite()) return invalid("--target is not finite");
+  Status place = check_error_place(options.case_file, options.model, options.target);
+  if (!place) return place;
   if (options.target && options.brain.empty()) {
     return invalid(
         "--target needs --brain, the brain's mask: skull and scalp, which ultrasound does not "
@@ -77,38 +73,29 @@ Result<VoxelImage> inside_of(const TriangleSurface& surface) {
   return image;
 }
 
-Result<VoxelImage> given_mask(const fs::path& path) {
-  auto mask = io::read_volume(path);
-  if (!mask) return mask;
-  bool any = false;
-  for (float& value : mask->values) {
-    value = value > 0.0F ? 1.0F : 0.0F;
-    any = any || value > 0.0F;
-  }
-  if (!any) return io::file_error(ErrorCode::kEmptySet, path, "no voxel is > 0: is it the brain?");
-  return mask;
+Result<VoxelImage> given_mask(const fs::path& path, anatomy::Notes& notes) {
+  const auto image = io::read_volume(path);
+  if (!image) return tl::unexpected(image.error());
+  return anatomy::brain_mask(*image, path.string(), &notes);
 }
 
 Result<PatientImages> read_images(const UltrasoundRegisterOptions& options,
-                                  const Progress& progress, std::string& target) {
+                                  const Progress& progress, anatomy::Notes& notes) {
   PatientImages images;
   auto mri = io::read_volume(options.mri);
   if (!mri) return tl::unexpected(mri.error());
   images.mri = std::move(*mri);
   if (!options.brain.empty()) {
-    auto mask = given_mask(options.brain);
+    auto mask = given_mask(options.brain, notes);
     if (!mask) return tl::unexpected(mask.error());
     images.brain = std::move(*mask);
   }
   if (options.target) {
-    target = fmt::format("({:.1f}, {:.1f}, {:.1f})", options.target->x(), options.target->y(),
-                         options.target->z());
     images.target = *options.target;
     return images;
   }
   const auto known = load_import_case(options.case_file, options.model, progress);
   if (!known) return tl::unexpected(known.error());
-  target = "the tumour";
   images.target = known->tumour_centroid();
   images.tumour = known->model.tumour;
   if (!options.brain.empty()) return images;
@@ -279,6 +266,7 @@ Result<UltrasoundRegisterReport> register_ultrasound(const UltrasoundRegisterOpt
   if (Status ok = check_ultrasound_options(options); !ok) return tl::unexpected(ok.error());
   UltrasoundRegisterReport report;
   report.picture = picture_of(options);
+  report.target = error_place(options.target);
   if (Status ok = check_new(report.picture); !ok) return tl::unexpected(ok.error());
   const auto T_first = io::read_pose(options.registration, "T_ras_reference");
   if (!T_first) return tl::unexpected(T_first.error());
@@ -287,7 +275,7 @@ Result<UltrasoundRegisterReport> register_ultrasound(const UltrasoundRegisterOpt
   ultrasound::ImagePoses poses;
   const auto samples = reference_samples(options, *recording, poses, report);
   if (!samples) return tl::unexpected(samples.error());
-  const auto images = read_images(options, progress, report.target);
+  const auto images = read_images(options, progress, report.notes);
   if (!images) return tl::unexpected(images.error());
 
   const auto registrar = registration::ImageRegistrar::create(images->mri, &images->brain);
@@ -344,7 +332,9 @@ std::vector<std::string> report_lines(const UltrasoundRegisterReport& report) {
   lines.push_back(error_line(report) +
                   ", of these frames; errors that all frames share (calibration, speed of sound) "
                   "are not in it");
-  for (const std::string& line : report.not_shown) lines.push_back("note: " + line);
+  for (const auto* list : {&report.notes, &report.not_shown}) {
+    for (const std::string& line : *list) lines.push_back("note: " + line);
+  }
   return lines;
 }
 

@@ -75,6 +75,7 @@ struct UltrasoundRegisterReport {
   double residual_most_mm = 0.0;  // at most
   double expected_mm = 0.0;       // error at the target, rms
   std::vector<std::string> not_shown;
+  std::vector<std::string> notes;  // of the mask
   RigidTransform T_ras_reference = RigidTransform::Identity();
   std::filesystem::path picture;  // as written
 };
