@@ -146,8 +146,9 @@ class Displays:
         try:
             while (message := self.reader.next(3600.0)) is not None:
                 self.messages[message.device, message.type] = message
-                if message.device == "brainshift_u":
-                    self.fields.append(parse_metadata(message.attribute))
+                # Until the bridge has read this peer's version it sends version 1, which has no label: no display shows that.
+                if message.device == "brainshift_u" and (label := parse_metadata(message.attribute)) is not None:
+                    self.fields.append(label)
                 if message.device == "brainshift_state":
                     self.heard = time.monotonic()
         except (OSError, igtl_reader.ProtocolError):
