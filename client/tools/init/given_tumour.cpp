@@ -36,9 +36,9 @@ struct TumourChoice {
   std::string why;
 };
 
-Result<TumourChoice> named_labels(const InitOptions& options, const io::LabelNames& names) {
+Result<TumourChoice> named_labels(const TumourFile& given, const io::LabelNames& names) {
   TumourChoice choice{{}, "--tumour-label"};
-  for (const std::string_view word : io::cells_of(options.tumour_label)) {
+  for (const std::string_view word : io::cells_of(given.label)) {
     double number = 0.0;
     const bool whole =
         io::parse_number(word, number) && number == std::round(number) && std::abs(number) < 1e9;
@@ -48,7 +48,7 @@ Result<TumourChoice> named_labels(const InitOptions& options, const io::LabelNam
     const auto found = std::find_if(names.begin(), names.end(), is_it);
     if (const auto times = std::count_if(names.begin(), names.end(), is_it); !whole && times > 1) {
       return invalid(fmt::format("--tumour-label: {}: {} has {} of this name: give the number",
-                                 in_quotes(word), options.tumour.string(), times));
+                                 in_quotes(word), given.file.string(), times));
     }
     if (!whole && found == names.end()) {
       std::string known;
@@ -56,7 +56,7 @@ Result<TumourChoice> named_labels(const InitOptions& options, const io::LabelNam
         known += (known.empty() ? "" : ", ") + in_quotes(name);
       }
       return invalid(fmt::format("--tumour-label: {}: must be a whole number, or a name of {} ({})",
-                                 in_quotes(word), options.tumour.string(),
+                                 in_quotes(word), given.file.string(),
                                  known.empty() ? "there is none" : known));
     }
     choice.labels.push_back(whole ? static_cast<int>(number) : found->first);
@@ -64,11 +64,11 @@ Result<TumourChoice> named_labels(const InitOptions& options, const io::LabelNam
   return choice;
 }
 
-Result<TumourChoice> tumour_labels(const InitOptions& options, const VoxelImage& image) {
-  if (!options.tumour_label.empty()) {
-    const auto names = io::label_names_beside(options.tumour);
+Result<TumourChoice> tumour_labels(const TumourFile& given, const VoxelImage& image) {
+  if (!given.label.empty()) {
+    const auto names = io::label_names_beside(given.file);
     if (!names) return tl::unexpected(names.error());
-    return named_labels(options, *names);
+    return named_labels(given, *names);
   }
   const std::set<int> there = labels_in(image);
   if (there.size() <= 1) {
@@ -87,26 +87,26 @@ Result<TumourChoice> tumour_labels(const InitOptions& options, const VoxelImage&
                                  [](float v) { return v == std::round(v); });
   if (!whole) return TumourChoice{{1}, "a soft mask"};
   return invalid(fmt::format("{}: has several labels; name the tumour's by --tumour-label: {}",
-                             options.tumour.string(), anatomy::listed_labels(image)));
+                             given.file.string(), anatomy::listed_labels(image)));
 }
 
 // The only one of DICOM's segments or structures (`what`), or those that were named. list: all of
 // them, for a refusal.
-Result<TumourChoice> only_or_named(const InitOptions& options, const io::LabelNames& names,
+Result<TumourChoice> only_or_named(const TumourFile& given, const io::LabelNames& names,
                                    std::string_view what,
                                    const std::function<std::string()>& list) {
-  if (options.tumour_label.empty() && names.size() == 1) {
+  if (given.label.empty() && names.size() == 1) {
     return TumourChoice{{names.begin()->first}, fmt::format("the only {}", what)};
   }
-  if (options.tumour_label.empty()) {
+  if (given.label.empty()) {
     return invalid(fmt::format("{}: has several {}s; name the tumour's by --tumour-label: {}",
-                               options.tumour.string(), what, list()));
+                               given.file.string(), what, list()));
   }
-  auto choice = named_labels(options, names);
+  auto choice = named_labels(given, names);
   for (const int number : choice ? choice->labels : std::vector<int>()) {
     if (names.count(number) != 0) continue;
     return invalid(fmt::format("--tumour-label: {}: {} has no such {}; it has {}", number,
-                               options.tumour.string(), what, list()));
+                               given.file.string(), what, list()));
   }
   return choice;
 }
@@ -156,55 +156,55 @@ Result<VoxelImage> structure_map(const io::DicomStructures& set, const std::vect
   return map;
 }
 
-Result<GivenTumour> from_structures(const InitOptions& options, const VoxelImage& grid,
-                                    const std::optional<io::DicomSeries>& series) {
-  const auto set = io::read_dicom_structures(options.tumour);
+Result<GivenTumour> from_structures(const TumourFile& given, const VoxelImage& grid,
+                                    const MriIdentity& mri) {
+  const auto set = io::read_dicom_structures(given.file);
   if (!set) return tl::unexpected(set.error());
-  if (series && !set->frame_of_reference.empty() && !series->frame_of_reference.empty() &&
-      set->frame_of_reference != series->frame_of_reference) {
-    return invalid(options.tumour.string() +
+  if (!set->frame_of_reference.empty() && !mri.frame_of_reference.empty() &&
+      set->frame_of_reference != mri.frame_of_reference) {
+    return invalid(given.file.string() +
                    ": was drawn in another frame of reference (0020,0052) than --mri: its places "
                    "are not those of this MRI");
   }
   io::LabelNames names;
   for (const io::DicomStructure& one : set->structures) names[one.number] = one.name;
   const auto choice =
-      only_or_named(options, names, "structure", [&] { return listed_structures(*set, grid); });
+      only_or_named(given, names, "structure", [&] { return listed_structures(*set, grid); });
   if (!choice) return tl::unexpected(choice.error());
   GivenTumour tumour{{}, choice->labels, choice->why, {}, true};
   auto map = structure_map(*set, choice->labels, grid, tumour.notes);
-  if (!map) return io::file_error(options.tumour, map.error());
-  if (series && !set->series.empty() && set->series != series->series) {
+  if (!map) return io::file_error(given.file, map.error());
+  if (!set->series.empty() && !mri.series.empty() && set->series != mri.series) {
     tumour.notes.emplace_back("drawn on another series in the MRI's frame of reference");
   }
   tumour.map = std::move(*map);
   return tumour;
 }
 
-Result<GivenTumour> from_segments(const InitOptions& options) {
-  const auto seg = io::read_dicom_segmentation(options.tumour);
+Result<GivenTumour> from_segments(const TumourFile& given) {
+  const auto seg = io::read_dicom_segmentation(given.file);
   if (!seg) return tl::unexpected(seg.error());
   const auto choice =
-      only_or_named(options, seg->names, "segment", [&] { return listed_segments(seg->names); });
+      only_or_named(given, seg->names, "segment", [&] { return listed_segments(seg->names); });
   if (!choice) return tl::unexpected(choice.error());
   return GivenTumour{io::label_map(*seg, choice->labels), choice->labels, choice->why, {}, true};
 }
 
 }  // namespace
 
-Result<GivenTumour> read_tumour(const InitOptions& options, const VoxelImage& grid,
-                                const std::optional<io::DicomSeries>& series) {
-  if (io::is_dicom(options.tumour)) {
-    return io::is_dicom_structures(options.tumour) ? from_structures(options, grid, series)
-                                                   : from_segments(options);
+Result<GivenTumour> read_tumour(const TumourFile& given, const VoxelImage& grid,
+                                const MriIdentity& mri) {
+  if (io::is_dicom(given.file)) {
+    return io::is_dicom_structures(given.file) ? from_structures(given, grid, mri)
+                                               : from_segments(given);
   }
-  auto map = io::read_label_map(options.tumour, {options.tumour_segment, 1});
+  auto map = io::read_label_map(given.file, {given.segment, 1});
   if (!map) return tl::unexpected(map.error());
-  const auto choice = tumour_labels(options, *map);
+  const auto choice = tumour_labels(given, *map);
   if (!choice) return tl::unexpected(choice.error());
   return GivenTumour{std::move(*map),
                      choice->labels,
-                     options.tumour_segment.empty() ? choice->why : "the segment",
+                     given.segment.empty() ? choice->why : "the segment",
                      {},
                      false};
 }

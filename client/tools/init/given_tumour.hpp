@@ -9,14 +9,12 @@
 //                        (io/dicom/filled_contours.hpp)
 #pragma once
 
-#include <optional>
+#include <filesystem>
 #include <string>
 #include <vector>
 
-#include "client/tools/init/init.hpp"
 #include "common/core/error.hpp"
 #include "common/core/mesh.hpp"
-#include "common/io/dicom/dicom_series.hpp"
 
 namespace brainshift::client {
 
@@ -28,11 +26,22 @@ struct GivenTumour {
   bool from_dicom = false;  // no file holds `map` yet
 };
 
-// grid: of the MRI. series: of an MRI from DICOM, in whose frame of reference a structure set must
-// have been drawn. kInvalidArgument: labels that are not there (those that are, are listed with
-// their volumes), several and none chosen, another frame of reference. Errors of the readers and of
+struct TumourFile {
+  std::filesystem::path file;
+  std::string label;    // --tumour-label: numbers, or names
+  std::string segment;  // --tumour-segment: of a .seg.nrrd
+};
+
+// Of an MRI from DICOM (0020,0052; 0020,000E); of others, and where not given, empty.
+struct MriIdentity {
+  std::string frame_of_reference, series;
+};
+
+// grid: of the MRI. A structure set must have been drawn in the MRI's frame of reference.
+// kInvalidArgument: labels that are not there (those that are, are listed with their volumes),
+// several and none chosen, another frame of reference. Errors of the readers and of
 // io::fill_contours.
-Result<GivenTumour> read_tumour(const InitOptions& options, const VoxelImage& grid,
-                                const std::optional<io::DicomSeries>& series);
+Result<GivenTumour> read_tumour(const TumourFile& given, const VoxelImage& grid,
+                                const MriIdentity& mri);
 
 }  // namespace brainshift::client

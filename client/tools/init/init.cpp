@@ -209,7 +209,10 @@ std::string about_series(const io::DicomSeries& series) {
 
 Status guess_tumour(Draft& draft, const VoxelImage& brain) {
   const InitOptions& options = draft.options;
-  auto given = read_tumour(options, draft.grid, draft.series);
+  MriIdentity mri;
+  if (draft.series) mri = {draft.series->frame_of_reference, draft.series->series};
+  auto given =
+      read_tumour({options.tumour, options.tumour_label, options.tumour_segment}, draft.grid, mri);
   if (!given) return tl::unexpected(given.error());
   draft.labels = given->labels;
   anatomy::Notes notes;
