@@ -79,10 +79,10 @@ replays: configure ## five recorded surgeries through the daemon at 1x and at fu
 	cmake --build --preset $(PRESET) -j $(JOBS) --target replay_programs
 	cmake/scripts/replays.sh $(BUILD)
 
-calculix: setup ## the patients of `make evidence` in CalculiX, whose fields are one of its truths, into out/calculix
+calculix: setup ## a slit with a sheet, and the patients of `make evidence`, whose fields are one of its truths, in CalculiX, into out/calculix
 	@docker/install-packages.sh docker/packages-calculix.txt
 	@cmake --preset $(PRESET) --log-level=WARNING
-	cmake --build --preset $(PRESET) -j $(JOBS) --target evidence_calculix
+	cmake --build --preset $(PRESET) -j $(JOBS) --target evidence_calculix slit_deck
 	cmake/scripts/calculix.sh $(BUILD)
 
 prior: configure ## brains drawn from the prior against published brain shift, into out/prior; QUICK=1 for a short run

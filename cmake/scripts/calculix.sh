@@ -3,7 +3,7 @@
 # calculix.sh BUILD_DIR [OUT_DIR]: the brains of the paper's five patients in CalculiX, with the loads of
 # their consistency truths (tests/evidence/calculix.hpp). Writes decks, what CalculiX printed and the
 # fields as tables to OUT_DIR (default: out/calculix). `make evidence` reads the fields that are kept
-# in tests/evidence/calculix; copy nodes.csv and patient-*.csv there to renew them. Takes a quarter of an hour.
+# in tests/evidence/calculix; copy nodes.csv, patient-*.csv and slit.csv there to renew them. Takes a quarter of an hour.
 set -euo pipefail
 cd "$(dirname "$0")/../.."
 
@@ -15,7 +15,11 @@ name=calculix
 
 empty_folder "$out"
 export OMP_NUM_THREADS=2  # of CalculiX
-for patient in ${PATIENTS:-1 2 3 4 5}; do
+cp tests/evidence/calculix/slit.inp "$out"
+step "slit: deck" "$bin/slit_deck" write "$out"
+step "slit: CalculiX" sh -c "cd '$out' && ccx slit >ccx.log"
+step "slit: field" "$bin/slit_deck" read "$out"
+for patient in ${PATIENTS-1 2 3 4 5}; do
   folder=$out/patient-$patient
   mkdir "$folder"
   cp tests/evidence/calculix/patient.inp "$folder"

@@ -12,7 +12,7 @@ bin=$(realpath "${1:?usage: fuzz.sh BIN_DIR [SECONDS] [TARGET...]}")
 seconds=${2:-60}
 shift $(( $# < 2 ? $# : 2 ))
 targets=("$@")
-[ ${#targets[@]} -gt 0 ] || targets=(wire igtl case daemon problem plus nifti nrrd mesh surface landmarks sequence surgery model)
+[ ${#targets[@]} -gt 0 ] || targets=(wire igtl case daemon problem plus nifti nrrd dicom mesh surface landmarks sequence surgery model)
 
 out=out/fuzz
 mkdir -p "$out/failed"

@@ -13,6 +13,7 @@
 #include "common/io/geometry/mesh_writer.hpp"
 #include "common/io/model/model_file.hpp"
 #include "common/io/recording/surgery_file.hpp"
+#include "tests/support/dicom_files.hpp"
 #include "tests/support/virtual_sweep.hpp"
 #include "tests/unit/io/model/model_file_example.hpp"
 
@@ -181,6 +182,26 @@ void surgeries(const Seeds& seeds) {
   check(file->close());
 }
 
+// 4 x 3 x 2 voxels with the labels 1 and 2.
+void dicom(const Seeds& seeds) {
+  VoxelImage labels;
+  labels.dims = {4, 3, 2};
+  labels.T_ras_voxel.linear().diagonal() << -1.0, -1.0, 2.0;
+  labels.values.assign(labels.num_voxels(), 1.0F);
+  labels.values.back() = 2.0F;
+  const fs::path folder = seeds.path("series", "");
+  test_support::write_series(folder, labels);
+  for (const auto& entry : fs::directory_iterator(folder)) {
+    fs::copy_file(entry.path(), seeds.path("dicom", entry.path().filename().string()));
+  }
+  fs::remove_all(folder);
+  test_support::write_segmentation(seeds.path("dicom", "seg.dcm"), labels,
+                                   {{1, "Tumour"}, {2, "Oedema"}});
+  Points square(3, 4);
+  square << 2, 9, 9, 2, 3, 3, 8, 8, 4, 4, 4, 4;
+  test_support::write_structure_set(seeds.path("dicom", "rs.dcm"), {{{1, "GTV", {{square}}}}});
+}
+
 void make(const Seeds& seeds) {
   seeds.copy_all("wire", "tests/data/wire", ".bin");
   seeds.copy_all("igtl", "tests/data/igtl", ".bin");
@@ -199,6 +220,7 @@ void make(const Seeds& seeds) {
               "0 0 0\n1 0 0\n0 1 0\n0 0 1\n$EndNodes\n$Elements\n1 1 1 1\n3 1 4 1\n1 1 2 3 4\n"
               "$EndElements\n");
   surfaces(seeds);
+  dicom(seeds);
   label_maps(seeds);
   landmarks(seeds);
   sequences(seeds);
