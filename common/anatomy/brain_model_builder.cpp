@@ -274,19 +274,6 @@ Septa septa_of(const geometry::SlitMesh& cut, const std::vector<NodeIndex>& fixe
   return septa;
 }
 
-void tell_anatomy(const geometry::SlitMesh& cut, const std::string& what, Notes* notes) {
-  if (!cut.side_nodes.empty()) {
-    add_note(notes, fmt::format("{}: falx and tentorium of {:.0f} cm2 with {} nodes that may touch "
-                                "them",
-                                what, 0.5 * geometry::area({cut.mesh.nodes, cut.sheets}) / 100.0,
-                                cut.side_nodes.size()));
-  }
-  if (cut.wall.cols() > 0) {
-    add_note(notes, fmt::format("{}: ventricles of {:.1f} cc", what,
-                                -geometry::enclosed_volume({cut.mesh.nodes, cut.wall}) / 1000.0));
-  }
-}
-
 }  // namespace
 
 BrainSurface brain_surface_of(const TetMesh& mesh) {
@@ -368,7 +355,6 @@ Result<BrainModel> build_brain_model(const CaseInputs& inputs, const Progress& p
                                          named_labels(config), notes);
     if (!cut) return tl::unexpected(cut.error());
     follow(*sets, *cut);
-    tell_anatomy(*cut, named_labels(config), notes);
     model.septa = septa_of(*cut, sets->fixed, config.anatomy.septum_gap_mm);
     model.mesh = std::move(cut->mesh);
     model.boundary_triangles = std::move(cut->outer);

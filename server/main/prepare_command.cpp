@@ -171,9 +171,13 @@ void print_table(const Outcome& outcome, const std::filesystem::path& out) {
   fmt::print("case        {}   model {}\n", model.case_id, model.model_id);
   fmt::print("mesh        {} nodes, {} tetrahedra ({:.1f} s)\n", model.mesh.num_nodes(),
              model.mesh.num_tets(), outcome.patient.mesh_s);
-  fmt::print("node sets   craniotomy {}, brainstem {}, slaves {}, fixed {}\n\n",
+  fmt::print("node sets   craniotomy {}, brainstem {}, slaves {}, fixed {}\n",
              model.craniotomy.size(), model.brainstem.size(), model.slaves.size(),
              model.fixed.size());
+  if (!model.septa.slaves.empty()) {
+    fmt::print("anatomy     {} nodes may touch falx and tentorium\n", model.septa.slaves.size());
+  }
+  fmt::print("\n");
   fmt::print("{:<10}{:>11}{:>11}{:>11}{:>12}{:>13}{:>7}{:>9}\n", "boundary", "assemble s",
              "analyse s", "factor s", "nnz(L)", "condensed s", "modes", "MiB");
   for (std::size_t i = 0; i < kPreparedBoundaries.size(); ++i) {

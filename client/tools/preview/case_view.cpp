@@ -28,7 +28,7 @@ constexpr double kShortBrain_mm = 100.0;
 constexpr double kLongBrain_mm = 220.0;
 constexpr double kLargeTumour = 0.1;  // of the brain's volume
 constexpr double kFewSlaves = 0.01;   // of the surface's nodes
-constexpr double kMm3PerCc = 1000.0;
+constexpr double kMm3PerCc = 1000.0, kMm2PerCm2 = 100.0;
 constexpr double kFarProjection_mm = 10.0;
 constexpr double kSmallBrain_cc = 900.0, kLargeBrain_cc = 1900.0;
 constexpr double kAcross_mm = 3.0;  // from the surface, where the MRI is looked at
@@ -199,6 +199,14 @@ std::vector<std::string> facts(const CaseView& view) {
     lines.push_back(fmt::format("tumour: {:.1f} cc at {}",
                                 geometry::enclosed_volume(view.tumour) / kMm3PerCc,
                                 place_text(centre_of(view.tumour))));
+  }
+  if (view.septa.triangles.cols() > 0) {
+    lines.push_back(fmt::format("falx and tentorium: {:.0f} cm2",
+                                0.5 * geometry::area(view.septa) / kMm2PerCm2));
+  }
+  if (view.ventricles.triangles.cols() > 0) {
+    lines.push_back(fmt::format("ventricles: {:.1f} cc",
+                                -geometry::enclosed_volume(view.ventricles) / kMm3PerCc));
   }
   if (const auto opening = opening_of(view)) {
     lines.push_back(fmt::format(
