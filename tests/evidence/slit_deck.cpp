@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// slit_deck write|read FOLDER: what calculix/slit.inp includes, and what CalculiX printed as a table,
-// slit.csv (a node a line, its place and its displacement, mm), for cmake/scripts/calculix.sh.
+// slit_deck write|read FOLDER: what calculix/slit.inp includes, and what CalculiX printed as a
+// table, slit.csv (a node a line, its place and its displacement, mm), for calculix.sh.
 #include <fmt/format.h>
 
 #include <cstdio>
