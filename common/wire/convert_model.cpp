@@ -15,6 +15,8 @@ std::string encode(const BrainModel& model) {
   set<4>(model.mesh.tets, message.mutable_tet_indices());
   set(model.mesh.labels, message.mutable_tet_labels());
   set<3>(model.boundary_triangles, message.mutable_boundary_indices());
+  set<3>(model.septa.triangles, message.mutable_septa_indices());
+  set<3>(model.ventricle_wall, message.mutable_ventricle_indices());
   set(model.skull, message.mutable_skull());
   set(model.tumour, message.mutable_tumour());
   set(model.craniotomy, message.mutable_craniotomy());
@@ -46,6 +48,10 @@ Result<BrainModel> decode_model(std::string_view payload) {
                       std::to_string(model.mesh.tets.cols()) + ")");
   model.boundary_triangles =
       checked.index_columns<3>(message.boundary_indices(), nodes, "model.boundary_indices");
+  model.septa.triangles =
+      checked.index_columns<3>(message.septa_indices(), nodes, "model.septa_indices");
+  model.ventricle_wall =
+      checked.index_columns<3>(message.ventricle_indices(), nodes, "model.ventricle_indices");
   model.skull = checked.surface(message.skull(), "model.skull");
   model.tumour = checked.surface(message.tumour(), "model.tumour");
   model.craniotomy = checked.indices(message.craniotomy(), nodes, "model.craniotomy");

@@ -73,6 +73,8 @@ def test_a_model_has_the_arrays_that_were_sent():
     assert model.tumour.triangles.shape == (1, 3)
     assert np.array_equal(model.gravity_direction, described["gravity_direction"])
     assert model.tet_labels.tolist() == described["tet_labels"]
+    assert model.septa.ravel().tolist() == described["septa_indices"]
+    assert model.ventricles.ravel().tolist() == described["ventricle_indices"]
 
 
 def test_session_states_and_other_replies_are_read():

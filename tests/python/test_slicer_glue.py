@@ -15,7 +15,8 @@ from slicer_stub import CLASSES
 FIELD, SD, KNOWN, STATE = "brainshift_u", "brainshift_sd", "brainshift_known", "brainshift_state"
 KINDS = {FIELD: "vtkMRMLVectorVolumeNode", SD: "vtkMRMLScalarVolumeNode", KNOWN: "vtkMRMLScalarVolumeNode",
          STATE: "vtkMRMLTextNode",
-         "brainshift_tumour": "vtkMRMLModelNode", "brainshift_cortex": "vtkMRMLModelNode"}
+         "brainshift_tumour": "vtkMRMLModelNode", "brainshift_cortex": "vtkMRMLModelNode",
+         "brainshift_septa": "vtkMRMLModelNode"}
 
 
 class Room:
@@ -73,7 +74,7 @@ class Room:
     def send(self, **changes):
         """An update, as the bridge sends it."""
         self.send_field(**changes)
-        for name in (SD, KNOWN, "brainshift_tumour", "brainshift_cortex"):
+        for name in (SD, KNOWN, "brainshift_tumour", "brainshift_cortex", "brainshift_septa"):
             self.receive(name, lambda node: None, metadata(**changes))
         self.send_state(**changes)
 

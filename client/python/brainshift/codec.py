@@ -207,7 +207,8 @@ def model(payload: bytes) -> v.Model:
         _surface(m.skull, "skull"), _surface(m.tumour, "tumour"), craniotomy, brainstem, slaves, fixed,
         checked.unit_vector(m.gravity_direction, "gravity_direction"),
         checked.number(m.fluid_plane_depth_mm, "fluid_plane_depth_mm"),
-        checked.number(m.slave_plane_depth_mm, "slave_plane_depth_mm"), labels if len(labels) > 0 else None)
+        checked.number(m.slave_plane_depth_mm, "slave_plane_depth_mm"), labels if len(labels) > 0 else None,
+        _rows(m.septa_indices, 3, count, "septa_indices"), _rows(m.ventricle_indices, 3, count, "ventricle_indices"))
 
 
 # ---------- updates ----------

@@ -118,6 +118,8 @@ class Model:
     fluid_plane_depth_mm: float  # x . gravity_direction
     slave_plane_depth_mm: float
     tet_labels: Optional[Indices]  # (m,), 0: brain
+    septa: Indices  # (s, 3), falx and tentorium from either side, out of the tissue; none without labels
+    ventricles: Indices  # (w, 3), wall of the cavities, out of the tissue; none without labels
 
     def __repr__(self) -> str:
         return (f"Model(case {self.case_id!r}, model {self.model_id}, {len(self.nodes)} nodes, {len(self.tets)} tetrahedra, "

@@ -20,24 +20,35 @@ Status encode_volume(const igtl::Envelope& envelope, const igtl::ImageGeometry& 
   return igtl::encode(envelope, view, out);
 }
 
+const char* device_name(Shape shape) {
+  switch (shape) {
+    case Shape::kTumour: return "brainshift_tumour";
+    case Shape::kCortex: return "brainshift_cortex";
+    case Shape::kVentricles: return "brainshift_ventricles";
+    case Shape::kSepta: return "brainshift_septa";
+  }
+  return "";
+}
+
 }  // namespace
 
 Broadcast::Broadcast(PicturePtr picture, Part part, std::uint32_t message_id)
     : picture_(std::move(picture)), part_(part), message_id_(message_id) {
-  devices_ = {Device::kStatus, Device::kState};
+  shown_ = {Device::kStatus, Device::kState};
   if (whole() && picture_->rest) {
-    devices_.push_back(Device::kField);
-    if (picture_->rest->with_sd) devices_.insert(devices_.end(), {Device::kSd, Device::kKnown});
-    if (picture_->rest->tumour) devices_.push_back(Device::kTumour);
-    if (picture_->rest->cortex) devices_.push_back(Device::kCortex);
+    shown_.push_back(Device::kField);
+    if (picture_->rest->with_sd) shown_.insert(shown_.end(), {Device::kSd, Device::kKnown});
+    for (const Shape shape : kShapes) {
+      if (picture_->rest->surfaces[shape]) shown_.push_back(shape);
+    }
   }
-  for (auto& each : encoded_) each.resize(devices_.size());
+  for (auto& each : encoded_) each.resize(shown_.size());
 }
 
 const std::string& Broadcast::bytes(std::size_t i, std::uint16_t version) {
   std::string& bytes = encoded_[version >= 2 ? 1 : 0][i];
   if (bytes.empty()) {
-    if (auto ok = encode(devices_[i], version >= 2 ? 2 : 1, bytes); !ok) {
+    if (auto ok = encode(shown_[i], version >= 2 ? 2 : 1, bytes); !ok) {
       error_ = ok.error().message;
     }
   }
@@ -52,14 +63,19 @@ std::size_t Broadcast::held_bytes() const {
   return sum;
 }
 
-Status Broadcast::encode(Device device, std::uint16_t version, std::string& out) const {
+Status Broadcast::encode(Shown shown, std::uint16_t version, std::string& out) const {
   igtl::Envelope envelope;
   envelope.version = version;
   envelope.timestamp = picture_->time;
   envelope.message_id = message_id_;
   if (version >= 2) envelope.metadata = to_metadata(picture_->state);
   const auto& rest = picture_->rest;
-  switch (device) {
+  if (const Shape* shape = std::get_if<Shape>(&shown)) {
+    envelope.device = device_name(*shape);
+    const auto& deformed = picture_->surfaces[*shape];
+    return igtl::encode(envelope, deformed ? *deformed : *rest->surfaces[*shape], out);
+  }
+  switch (std::get<Device>(shown)) {
     case Device::kStatus:
       envelope.device = "brainshift";
       return igtl::encode(envelope, to_status(picture_->state), out);
@@ -75,12 +91,6 @@ Status Broadcast::encode(Device device, std::uint16_t version, std::string& out)
     case Device::kKnown:
       envelope.device = "brainshift_known";
       return encode_volume(envelope, rest->geometry, 1, picture_->known, out);
-    case Device::kTumour:
-      envelope.device = "brainshift_tumour";
-      return igtl::encode(envelope, picture_->tumour ? *picture_->tumour : *rest->tumour, out);
-    case Device::kCortex:
-      envelope.device = "brainshift_cortex";
-      return igtl::encode(envelope, picture_->cortex ? *picture_->cortex : *rest->cortex, out);
   }
   return fail(ErrorCode::kInternal, "no such device");
 }

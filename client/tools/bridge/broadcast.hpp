@@ -7,7 +7,7 @@
 //   brainshift_u      IMAGE     float32 x 3
 //   brainshift_sd     IMAGE     float32
 //   brainshift_known  IMAGE     float32
-//   brainshift_tumour, brainshift_cortex   POLYDATA
+//   brainshift_tumour, brainshift_cortex, brainshift_ventricles, brainshift_septa   POLYDATA
 //
 // Belongs to one thread.
 #pragma once
@@ -16,6 +16,7 @@
 #include <cstdint>
 #include <memory>
 #include <string>
+#include <variant>
 #include <vector>
 
 #include "client/tools/bridge/picture.hpp"
@@ -35,7 +36,7 @@ class Broadcast {
   const Picture& picture() const { return *picture_; }
   const PicturePtr& picture_ptr() const { return picture_; }
   bool whole() const { return part_ == Part::kWhole; }
-  std::size_t size() const { return devices_.size(); }
+  std::size_t size() const { return shown_.size(); }
   // One message, 0 <= i < size(). Empty when it cannot be encoded: then error() says why.
   const std::string& bytes(std::size_t i, std::uint16_t version);
   const std::string& error() const { return error_; }
@@ -43,13 +44,14 @@ class Broadcast {
   std::size_t held_bytes() const;
 
  private:
-  enum class Device { kStatus, kState, kField, kSd, kKnown, kTumour, kCortex };
-  Status encode(Device device, std::uint16_t version, std::string& out) const;
+  enum class Device { kStatus, kState, kField, kSd, kKnown };
+  using Shown = std::variant<Device, Shape>;
+  Status encode(Shown shown, std::uint16_t version, std::string& out) const;
 
   PicturePtr picture_;
   Part part_;
   std::uint32_t message_id_;
-  std::vector<Device> devices_;
+  std::vector<Shown> shown_;
   std::array<std::vector<std::string>, 2> encoded_;  // of versions 1 and 2
   std::string error_;
 };

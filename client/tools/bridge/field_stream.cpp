@@ -31,6 +31,16 @@ igtl::PolyData resting(const TriangleSurface& surface, bool with_sd) {
   return data;
 }
 
+TriangleSurface surface_of(const BrainModel& model, Shape shape) {
+  switch (shape) {
+    case Shape::kTumour: return model.tumour;
+    case Shape::kCortex: return geometry::surface_of(model.mesh.nodes, model.boundary_triangles);
+    case Shape::kVentricles: return geometry::surface_of(model.mesh.nodes, model.ventricle_wall);
+    case Shape::kSepta: return geometry::surface_of(model.mesh.nodes, model.septa.triangles);
+  }
+  return {};
+}
+
 }  // namespace
 
 Result<FieldStream> FieldStream::build(const BrainModel& model, const StreamOptions& options) {
@@ -59,19 +69,19 @@ Result<FieldStream> FieldStream::build(const BrainModel& model, const StreamOpti
   rest->geometry = igtl::image_geometry(grid->dims, T_ras_voxel);
   rest->with_sd = options.with_sd;
   if (options.with_surfaces) {
-    const TriangleSurface cortex = geometry::surface_of(model.mesh.nodes, model.boundary_triangles);
-    stream.cortex_ = anchors(locator, cortex.vertices);
-    rest->cortex = resting(cortex, options.with_sd);
-    if (model.tumour.num_triangles() > 0) {
-      stream.tumour_ = anchors(locator, model.tumour.vertices);
-      rest->tumour = resting(model.tumour, options.with_sd);
+    for (const Shape shape : kShapes) {
+      const TriangleSurface surface = surface_of(model, shape);
+      if (surface.num_triangles() == 0) continue;
+      const bool moves = shape != Shape::kSepta;
+      if (moves) stream.anchors_of(shape) = anchors(locator, surface.vertices);
+      rest->surfaces[shape] = resting(surface, moves && options.with_sd);
     }
   }
   stream.rest_ = std::move(rest);
   stream.needed_ = stream.sampler_.nodes_used();
-  for (const Anchors* each : {&stream.tumour_, &stream.cortex_}) {
-    stream.needed_.insert(stream.needed_.end(), each->nodes.data(),
-                          each->nodes.data() + each->nodes.size());
+  for (const Anchors& each : stream.anchors_) {
+    stream.needed_.insert(stream.needed_.end(), each.nodes.data(),
+                          each.nodes.data() + each.nodes.size());
   }
   std::sort(stream.needed_.begin(), stream.needed_.end());
   stream.needed_.erase(std::unique(stream.needed_.begin(), stream.needed_.end()),
@@ -97,7 +107,8 @@ FieldStream::Anchors FieldStream::anchors(const geometry::TetLocator& mesh, cons
 
 FieldChoice FieldStream::smallest_choice(const BrainModel& model) const {
   if (static_cast<int>(needed_.size()) == model.mesh.num_nodes() || needed_.empty()) return {};
-  if (cortex_.nodes.cols() > 0) return {};  // a ball round the whole surface leaves nothing out
+  if (rest_->surfaces[Shape::kCortex])
+    return {};  // a ball round the whole surface leaves nothing out
   Vec3 low = model.mesh.nodes.col(needed_.front()), high = low;
   for (const NodeIndex node : needed_) {
     low = low.cwiseMin(model.mesh.nodes.col(node));
@@ -175,8 +186,12 @@ Result<std::shared_ptr<Picture>> FieldStream::picture(const UpdateMessage& messa
     voxels->resize(grid().num_voxels());
     sampler_.sample_scalar(scalar->values, voxels->data());
   }
-  if (rest_->tumour) picture->tumour = deformed(*rest_->tumour, tumour_);
-  if (rest_->cortex) picture->cortex = deformed(*rest_->cortex, cortex_);
+  for (const Shape shape : kShapes) {
+    const auto& rest = rest_->surfaces[shape];
+    if (rest && shape != Shape::kSepta) {
+      picture->surfaces[shape] = deformed(*rest, anchors_of(shape));
+    }
+  }
 
   const QualityVerdict& verdict = message.update.estimate.quality;
   ShownState& state = picture->state;

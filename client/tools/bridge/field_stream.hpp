@@ -6,8 +6,10 @@
 //            that every node of the region is shown as the mesh has it, within grid_error_mm
 //   tumour   the model's tumour surface, moved by u of the mesh
 //   cortex   the boundary of the mesh, moved by u
+//   ventricles, septa   of a model that has them: the wall moved by u; the sheets, which stay
 #pragma once
 
+#include <array>
 #include <memory>
 #include <vector>
 
@@ -52,6 +54,7 @@ class FieldStream {
   };
   explicit FieldStream(GridSampler sampler) : sampler_(std::move(sampler)) {}
   static Anchors anchors(const geometry::TetLocator& mesh, const Points& points);
+  Anchors& anchors_of(Shape shape) { return anchors_[static_cast<std::size_t>(shape)]; }
   Status take(const UpdateMessage& message);
   igtl::PolyData deformed(const igtl::PolyData& rest, const Anchors& anchors) const;
   FieldChoice smallest_choice(const BrainModel& model) const;
@@ -60,8 +63,8 @@ class FieldStream {
   double fade_mm_ = 0.0;
   std::string model_id_;
   std::shared_ptr<const Rest> rest_;
-  Anchors tumour_, cortex_;
-  std::vector<NodeIndex> needed_;  // ascending
+  std::array<Anchors, kShapes.size()> anchors_;  // of the shapes that move
+  std::vector<NodeIndex> needed_;                // ascending
   FieldChoice choice_;
   // Of the newest update, at every node; zero where the choice has none.
   Points u_;

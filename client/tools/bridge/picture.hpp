@@ -60,13 +60,29 @@ igtl::Metadata to_metadata(const ShownState& state);
 // Code 1 when usable(), with the flags of one to be used with caution; else 13 with the reason.
 igtl::StatusReport to_status(const ShownState& state);
 
+// Surfaces that are shown. Falx and tentorium are fixed sheets: they stay where they are.
+enum class Shape { kTumour, kCortex, kVentricles, kSepta };
+inline constexpr std::array kShapes = {Shape::kTumour, Shape::kCortex, Shape::kVentricles,
+                                       Shape::kSepta};
+class Surfaces {
+ public:
+  std::optional<igtl::PolyData>& operator[](Shape shape) {
+    return data_[static_cast<std::size_t>(shape)];
+  }
+  const std::optional<igtl::PolyData>& operator[](Shape shape) const {
+    return data_[static_cast<std::size_t>(shape)];
+  }
+
+ private:
+  std::array<std::optional<igtl::PolyData>, kShapes.size()> data_;
+};
+
 // What stays the same for as long as the model does.
 struct Rest {
   igtl::ImageGeometry geometry;
   bool with_sd = true;  // volumes and attributes sd_mm and known
-  // Undeformed, with attributes of zeros; empty when surfaces are not wanted.
-  std::optional<igtl::PolyData> tumour;
-  std::optional<igtl::PolyData> cortex;
+  // Undeformed, with attributes of zeros; those that the model has, none when they are not wanted.
+  Surfaces surfaces;
 };
 
 // A value that is not changed any more once it is made; the threads share it.
@@ -79,8 +95,7 @@ struct Picture {
   std::vector<float> u;      // 3 per voxel, mm
   std::vector<float> sd;     // 1 per voxel, mm
   std::vector<float> known;  // 1 per voxel, 0 to 1
-  std::optional<igtl::PolyData> tumour;
-  std::optional<igtl::PolyData> cortex;
+  Surfaces surfaces;         // deformed; where empty, as at rest
 };
 using PicturePtr = std::shared_ptr<const Picture>;
 

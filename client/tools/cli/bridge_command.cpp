@@ -164,8 +164,9 @@ void add_bridge(CLI::App& app, Status& status) {
   command->footer(
       R"(It starts no session. Clients get, on the undeformed brain in RAS and mm: brainshift_u (the
 displacement, undeformed to deformed), brainshift_sd, brainshift_known (0 a guess, 1 known by the
-data), brainshift_tumour, brainshift_cortex, brainshift_state (JSON) and brainshift (STATUS). When
-the field is not current, the volumes are blank and the reason is given. Examples:
+data), brainshift_tumour, brainshift_cortex, of a model with anatomy brainshift_ventricles and
+brainshift_septa (falx and tentorium), brainshift_state (JSON) and brainshift (STATUS). When the
+field is not current, the volumes are blank and the reason is given. Examples:
   brainshift bridge
       then, in Slicer's OpenIGTLinkIF: a client connector to localhost, port 18945
   brainshift bridge --region brain --margin 20mm --spacing 3mm --no-surfaces

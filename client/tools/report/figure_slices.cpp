@@ -25,6 +25,8 @@ constexpr double kDifferenceFactor = 5.0;  // "magnified five times for visualiz
 const Stroke kSliceBefore{palette::kWhite, 3, 12.0};
 const Stroke kSliceTrue{palette::kSkyBlue, 8, 0.0};
 const Stroke kSliceEstimated{palette::kOrange, 3, 0.0};
+const Stroke kSliceSepta{palette::kGreen, 3, 0.0};
+const Stroke kSliceVentricles{palette::kVermillion, 3, 0.0};
 
 struct Estimated {
   std::string boundary;
@@ -108,6 +110,18 @@ void draw_tumour(SlicePanel& panel, const Scene& scene, const Points& estimate) 
   panel.draw_section(scene.head.tumour, kSliceBefore);
 }
 
+// Falx, tentorium and ventricles before, where the model has them.
+void draw_anatomy(SlicePanel& panel, const Scene& scene) {
+  panel.draw_section(scene.head.septa, kSliceSepta);
+  panel.draw_section(scene.head.ventricles, kSliceVentricles);
+}
+void add_anatomy(std::vector<LegendEntry>& legend, const Scene& scene) {
+  if (scene.head.septa.num_triangles() > 0) legend.push_back({"falx, tentorium", kSliceSepta});
+  if (scene.head.ventricles.num_triangles() > 0) {
+    legend.push_back({"ventricles before", kSliceVentricles});
+  }
+}
+
 std::vector<LegendEntry> outline_legend(const Scene& scene, const std::string& what) {
   std::vector<LegendEntry> legend = {{what + " before", kSliceBefore},
                                      {what + " estimated", kSliceEstimated}};
@@ -143,8 +157,10 @@ cv::Mat shift_sheet(const Scene& scene, Plane plane) {
   sheet.legend = outline_legend(scene, "tumour");
   if (scene.truth != nullptr)
     sheet.legend.push_back({"true displacement", {palette::kWhite, 1, 0.0}});
+  add_anatomy(sheet.legend, scene);
   for (const Estimated& e : scene.estimates) {
     SlicePanel panel = background(scene, window, 0.7);
+    draw_anatomy(panel, scene);
     panel.draw_arrows(samples, *e.displacement, magnification, sheet.colour_max, false);
     if (scene.truth != nullptr) {
       panel.draw_arrows(samples, *scene.truth, magnification, sheet.colour_max, true);
@@ -196,8 +212,10 @@ cv::Mat difference_sheet(const Scene& scene) {
                    "x, differences first multiplied by the factor in their title";
   sheet.colour_max = round_up(largest);
   sheet.colour_label = "length, with the title's factor (mm)";
+  add_anatomy(sheet.legend, scene);
   const auto add = [&](const std::string& title, const Points& field) {
     SlicePanel panel = background(scene, window, 0.7);
+    draw_anatomy(panel, scene);
     panel.draw_arrows(samples, field, magnification, sheet.colour_max, false);
     panel.draw_orientation(20.0);
     panel.draw_gravity(scene.head.gravity_direction);
@@ -230,11 +248,13 @@ cv::Mat map_sheet(const Scene& scene, const std::function<Points(const Estimated
   sheet.subtitle =
       slice_name(scene, window, "craniotomy centre") + "; one colour scale for all panels";
   sheet.legend = {{"tumour before", kSliceBefore}};
+  add_anatomy(sheet.legend, scene);
   for (const Estimated& e : scene.estimates) {
     const Points field = field_of(e);
     if (field.cols() == 0) continue;
     SlicePanel panel = background(scene, window, 0.9);
     panel.draw_magnitude_map(samples, field, sheet.colour_max, 0.7);
+    draw_anatomy(panel, scene);
     panel.draw_section(scene.head.tumour, kSliceBefore);
     panel.draw_orientation(20.0);
     sheet.panels.push_back({e.boundary + " boundary", panel.image()});

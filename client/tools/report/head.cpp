@@ -5,6 +5,7 @@
 #include <cctype>
 #include <tuple>
 
+#include "common/geometry/surface.hpp"
 #include "common/io/geometry/label_map_file.hpp"
 #include "common/io/geometry/mesh_file.hpp"
 #include "common/patient/read_patient.hpp"
@@ -37,6 +38,8 @@ Result<Head> load_head(const std::filesystem::path& case_file, const Progress& p
   head.craniotomy_centre = mean_of(model.mesh.nodes(Eigen::all, model.craniotomy));
   head.model_id = model.model_id;
   head.tumour = std::move(model.tumour);
+  head.septa = geometry::surface_of(model.mesh.nodes, model.septa.triangles);
+  head.ventricles = geometry::surface_of(model.mesh.nodes, model.ventricle_wall);
   head.tumour_centre = mean_of(head.tumour.vertices);
   head.gravity_direction = model.gravity_direction;
   return head;

@@ -20,6 +20,7 @@ struct Head {
   std::string model_id;
   std::optional<VoxelImage> mri;  // absent when the case names none
   TriangleSurface tumour;
+  TriangleSurface septa, ventricles;      // falx and tentorium; walls; empty without labels
   Vec3 craniotomy_centre = Vec3::Zero();  // mean of the craniotomy nodes
   Vec3 tumour_centre = Vec3::Zero();      // mean of the tumour's vertices
   Vec3 gravity_direction = Vec3::Zero();

@@ -63,7 +63,7 @@ SCHEMA = {
         "tumour": (7, "Surface"), "craniotomy": (8, "*int"), "brainstem": (9, "*int"),
         "slaves": (10, "*int"), "fixed": (11, "*int"), "gravity_direction": (12, "*double"),
         "fluid_plane_depth_mm": (13, "double"), "slave_plane_depth_mm": (14, "double"),
-        "tet_labels": (15, "*int")},
+        "tet_labels": (15, "*int"), "septa_indices": (16, "*int"), "ventricle_indices": (17, "*int")},
     "ObservationReply": {"observation_sequence": (1, "int"), "replaced_pending": (2, "int")},
     "ErrorReply": {"code": (1, "text"), "message": (2, "text")},
     "MeanStd": {"mean_mm": (1, "double"), "std_mm": (2, "double")},
@@ -164,7 +164,7 @@ MESSAGES = {
                    "triangle_indices": [0, 1, 2]},
         "craniotomy": [3], "brainstem": [], "slaves": [1, 2], "fixed": [0],
         "gravity_direction": [0.6, -0.8, 0.0], "fluid_plane_depth_mm": -1.5,
-        "slave_plane_depth_mm": 18.5, "tet_labels": [2]}),
+        "slave_plane_depth_mm": 18.5, "tet_labels": [2], "septa_indices": [0, 1, 3], "ventricle_indices": [1, 2, 3]}),
     "subscribe_request": (7, 4, "SubscribeRequest", {"subscription": 5, "window": 1, "received": 70000}),
     "subscribe_ball": (7, 5, "SubscribeRequest", {
         "subscription": 1, "window": 1, "received": 0, "choice": {

@@ -231,7 +231,8 @@ def others():
     for path in ("nodes", "tets", "slaves"):
         changed("start_session_reply", f"{path}=2^31", (path, 2**31))
     changed("start_session_reply", "prepare_s=-1", ("prepare_s", -1.0))
-    for path in ("tet_indices", "boundary_indices", "skull.triangle_indices", "tumour.triangle_indices"):
+    for path in ("tet_indices", "boundary_indices", "septa_indices", "ventricle_indices", "skull.triangle_indices",
+                 "tumour.triangle_indices"):
         indices = at(BASES["model_reply"][2], path.split("."))
         limit = 3 if path.startswith("tumour") else 4
         for name, entry in (("negative", -1), ("beyond", limit)):

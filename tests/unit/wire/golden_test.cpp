@@ -93,6 +93,8 @@ BrainModel model_from(const json& value) {
   model.mesh.tets = columns_from<4>(value["tet_indices"]);
   model.mesh.labels = value["tet_labels"].get<std::vector<int>>();
   model.boundary_triangles = columns_from<3>(value["boundary_indices"]);
+  model.septa.triangles = columns_from<3>(value["septa_indices"]);
+  model.ventricle_wall = columns_from<3>(value["ventricle_indices"]);
   model.skull = surface_from(value["skull"]);
   model.tumour = surface_from(value["tumour"]);
   model.craniotomy = value["craniotomy"].get<std::vector<int>>();

@@ -68,6 +68,8 @@ inline void expect_same(const BrainModel& a, const BrainModel& b) {
   expect_same_matrix(a.mesh.tets, b.mesh.tets);
   EXPECT_EQ(a.mesh.labels, b.mesh.labels);
   expect_same_matrix(a.boundary_triangles, b.boundary_triangles);
+  expect_same_matrix(a.septa.triangles, b.septa.triangles);
+  expect_same_matrix(a.ventricle_wall, b.ventricle_wall);
   expect_same(a.skull, b.skull);
   expect_same(a.tumour, b.tumour);
   EXPECT_EQ(a.craniotomy, b.craniotomy);

@@ -83,6 +83,10 @@ inline BrainModel sample_model() {
   model.mesh.labels = {0, -7};
   model.boundary_triangles.resize(3, 2);
   model.boundary_triangles << 4, 0, 3, 1, 2, 2;
+  model.septa.triangles.resize(3, 1);
+  model.septa.triangles << 2, 0, 4;
+  model.ventricle_wall.resize(3, 1);
+  model.ventricle_wall << 1, 4, 3;
   model.skull = sample_surface();
   model.tumour = sample_surface();
   model.craniotomy = {0};

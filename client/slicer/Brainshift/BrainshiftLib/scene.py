@@ -16,7 +16,7 @@ from .label import LabelError, belongs, parse_metadata
 
 # The devices of `brainshift bridge`; SlicerOpenIGTLink gives their nodes the same names.
 FIELD, SD, KNOWN, STATE = "brainshift_u", "brainshift_sd", "brainshift_known", "brainshift_state"
-SURFACES = ("brainshift_tumour", "brainshift_cortex")
+SURFACES = ("brainshift_tumour", "brainshift_cortex", "brainshift_ventricles", "brainshift_septa")
 _CLASSES = {FIELD: "vtkMRMLVectorVolumeNode", SD: "vtkMRMLScalarVolumeNode", KNOWN: "vtkMRMLScalarVolumeNode",
             STATE: "vtkMRMLTextNode"}
 

@@ -52,6 +52,24 @@ UpdateMessage part_of(const BrainModel& model, const std::vector<NodeIndex>& nod
   return part;
 }
 
+TEST(FieldStream, AWallMovesWithTheBrainAndASheetStays) {
+  BrainModel model = test_support::toy_patient(6);
+  model.ventricle_wall = model.septa.triangles = model.mesh.tets.topRows<3>().leftCols<2>();
+  FieldStream stream = FieldStream::build(model, {.region = TumourRegion{5.0}}).value();
+  const auto picture = stream.picture(streamed_update(model)).value();
+  const auto& rest = picture->rest->surfaces;
+  const auto& wall = picture->surfaces[Shape::kVentricles];
+  ASSERT_TRUE(wall && rest[Shape::kVentricles] && rest[Shape::kSepta]);
+  for (Eigen::Index i = 0; i < wall->points.cols(); ++i) {
+    const Vec3 at = rest[Shape::kVentricles]->points.col(i).cast<double>();
+    EXPECT_LT((wall->points.col(i).cast<double>() - at - linear_field(at)).norm(), kFloat);
+  }
+  EXPECT_EQ(wall->attributes.size(), 3u);
+  EXPECT_FALSE(picture->surfaces[Shape::kSepta].has_value());
+  // Nothing is said of how sure a fixed sheet is.
+  EXPECT_EQ(rest[Shape::kSepta]->attributes.size(), 1u);
+}
+
 TEST(FieldStream, APictureHasFieldSurfacesAndState) {
   const BrainModel model = test_support::toy_patient(6);
   FieldStream stream = FieldStream::build(model, {.region = TumourRegion{5.0}}).value();
@@ -68,19 +86,24 @@ TEST(FieldStream, APictureHasFieldSurfacesAndState) {
   EXPECT_NEAR(picture->known[centre], 0.8, kFloat);
   for (Eigen::Index i = 0; i < model.tumour.vertices.cols(); ++i) {
     const Vec3 at = model.tumour.vertices.col(i);
-    EXPECT_LT((picture->tumour->points.col(i).cast<double>() - at - linear_field(at)).norm(),
-              kFloat);
     EXPECT_LT(
-        (picture->tumour->attributes[0].values.col(i).cast<double>() - linear_field(at)).norm(),
+        (picture->surfaces[Shape::kTumour]->points.col(i).cast<double>() - at - linear_field(at))
+            .norm(),
         kFloat);
+    EXPECT_LT((picture->surfaces[Shape::kTumour]->attributes[0].values.col(i).cast<double>() -
+               linear_field(at))
+                  .norm(),
+              kFloat);
   }
-  EXPECT_EQ(picture->tumour->attributes[0].name, "displacement_mm");
-  EXPECT_EQ(picture->tumour->attributes[1].name, "sd_mm");
-  EXPECT_EQ(picture->tumour->attributes[2].name, "known");
-  EXPECT_TRUE((picture->cortex->attributes[1].values.array() == 0.5F).all());
-  EXPECT_TRUE((picture->cortex->attributes[2].values.array() == 0.8F).all());
-  EXPECT_EQ(picture->cortex->points.cols(), geometry::boundary_surface(model.mesh).vertices.cols());
+  EXPECT_EQ(picture->surfaces[Shape::kTumour]->attributes[0].name, "displacement_mm");
+  EXPECT_EQ(picture->surfaces[Shape::kTumour]->attributes[1].name, "sd_mm");
+  EXPECT_EQ(picture->surfaces[Shape::kTumour]->attributes[2].name, "known");
+  EXPECT_TRUE((picture->surfaces[Shape::kCortex]->attributes[1].values.array() == 0.5F).all());
+  EXPECT_TRUE((picture->surfaces[Shape::kCortex]->attributes[2].values.array() == 0.8F).all());
+  EXPECT_EQ(picture->surfaces[Shape::kCortex]->points.cols(),
+            geometry::boundary_surface(model.mesh).vertices.cols());
 
+  EXPECT_FALSE(picture->rest->surfaces[Shape::kSepta].has_value());
   const ShownState& state = picture->state;
   EXPECT_EQ(state.sequence, 9u);
   EXPECT_EQ(state.session_id, 4u);
@@ -163,7 +186,7 @@ TEST(FieldStream, AFieldWithoutUncertaintySaysSo) {
   EXPECT_TRUE(older->state.has_sd);
   EXPECT_FALSE(older->state.has_known);
   EXPECT_TRUE(older->known.empty());
-  EXPECT_TRUE(older->cortex->attributes[2].values.isZero(0.0F));
+  EXPECT_TRUE(older->surfaces[Shape::kCortex]->attributes[2].values.isZero(0.0F));
   message.update.estimate.sd_mm.resize(0);
   const auto picture = stream.picture(message).value();
   EXPECT_FALSE(picture->state.has_sd);
