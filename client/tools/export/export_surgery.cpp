@@ -11,6 +11,7 @@
 #include "client/tools/export/sample_field.hpp"
 #include "client/tools/export/warp.hpp"
 #include "client/tools/journal/journal_export.hpp"
+#include "common/geometry/surface.hpp"
 #include "common/io/fields/field_files.hpp"
 #include "common/io/files/file_access.hpp"
 #include "common/io/files/output_path.hpp"
@@ -241,10 +242,20 @@ class Writing {
                 "modeling", "RAS", "RAS", "mm", "3D Slicer, ParaView, VTK"});
       return io::write_surface(place_ / file, made.surface, made.vertex_fields);
     };
-    return write("tumour.vtp", deformed_tumour(inputs_.model, estimate.displacement, of))
-        .and_then([&] {
-          return write("cortex.vtp", deformed_cortex(inputs_.model, estimate.displacement, of));
-        });
+    const BrainModel& model = inputs_.model;
+    const Points& u = estimate.displacement;
+    Status status = write("tumour.vtp", deformed_tumour(model, u, of));
+    for (const auto& [name, triangles] : {std::pair{"cortex.vtp", &model.boundary_triangles},
+                                          {"ventricles.vtp", &model.ventricle_wall}}) {
+      if (status && triangles->cols() > 0) {
+        status = write(name, deformed_triangles(model, *triangles, u, of));
+      }
+    }
+    if (!status || model.septa.triangles.cols() == 0) return status;
+    const std::string file = list({"septa.vtp", "falx and tentorium, which stay where they are", "",
+                                   "RAS", "RAS", "mm", "3D Slicer, ParaView, VTK"});
+    return io::write_surface(place_ / file,
+                             geometry::surface_of(model.mesh.nodes, model.septa.triangles), {});
   }
 
   Status manifest() const { return io::write_file(place_ / "export.json", to_json(manifest_)); }

@@ -3,7 +3,7 @@
 //
 //   displacement-1007.nii.gz  displacement-1006.nii.gz  displacement.nrrd  displacement.h5
 //   sd_mm.nii.gz  known.nii.gz  jacobian.nii.gz  warped-NAME.nii.gz  tumour.vtp  cortex.vtp
-//   series/  export.json
+//   series/  export.json          of a model that has them: ventricles.vtp  septa.vtp
 //
 // The field is that of sample_field.hpp, on one grid. export.json (manifest.hpp) says of each file
 // what it is. The names of an unusable update's files begin with "unusable-". The folder appears

@@ -107,10 +107,11 @@ DeformedSurface deformed_tumour(const BrainModel& model, const Points& u, const 
   return moved(model.tumour, at_vertices, there);
 }
 
-DeformedSurface deformed_cortex(const BrainModel& model, const Points& u, const Uncertainty& of) {
+DeformedSurface deformed_triangles(const BrainModel& model,
+                                   const Eigen::Matrix<int, 3, Eigen::Dynamic>& triangles,
+                                   const Points& u, const Uncertainty& of) {
   std::vector<NodeIndex> node_of_vertex;
-  TriangleSurface surface =
-      geometry::surface_of(model.mesh.nodes, model.boundary_triangles, &node_of_vertex);
+  TriangleSurface surface = geometry::surface_of(model.mesh.nodes, triangles, &node_of_vertex);
   const auto there = [&](const VecX& values) {
     return values.size() > 0 ? VecX(values(node_of_vertex)) : VecX();
   };

@@ -38,7 +38,10 @@ struct DeformedSurface {
 // The tumour's vertices lie anywhere in the mesh: u is interpolated there (outside of the mesh: at
 // its closest point).
 DeformedSurface deformed_tumour(const BrainModel& model, const Points& u, const Uncertainty& of);
-// The whole surface of the brain's mesh, brainstem included.
-DeformedSurface deformed_cortex(const BrainModel& model, const Points& u, const Uncertainty& of);
+// Triangles of the mesh's nodes, at least one: its boundary, brainstem included; the wall of the
+// ventricles.
+DeformedSurface deformed_triangles(const BrainModel& model,
+                                   const Eigen::Matrix<int, 3, Eigen::Dynamic>& triangles,
+                                   const Points& u, const Uncertainty& of);
 
 }  // namespace brainshift::client

@@ -12,6 +12,7 @@
 #include "common/io/geometry/image_file.hpp"
 #include "common/io/geometry/mesh_file.hpp"
 #include "common/io/recording/surgery_file.hpp"
+#include "common/values/model_id.hpp"
 #include "tests/support/results.hpp"
 #include "tests/unit/client/tools/export/small_export.hpp"
 
@@ -190,6 +191,24 @@ TEST_F(ExportSurgery, FormatsChooseFiles) {
   ASSERT_TRUE(export_surgery(options));
   EXPECT_THAT(names(options.out),
               UnorderedElementsAre("displacement.nrrd", "tumour.vtp", "cortex.vtp", "export.json"));
+}
+
+TEST_F(ExportSurgery, VentriclesAndSeptaAreThereWhereTheModelHasThem) {
+  BrainModel known = model;
+  known.ventricle_wall = model.mesh.tets.topRows<3>().leftCols<2>();
+  known.septa.triangles = model.mesh.tets.topRows<3>().rightCols<3>();
+  known.model_id = content_hash(known);
+  fs::remove(options.model);
+  fs::remove(path);
+  test_support::write_toy_model(options.model, known);
+  test_support::write_toy_journal(path, known,
+                                  {test_support::toy_update(known, 1, Quality::kGood, 0.5)});
+  options.formats = {ExportFormat::kSurfaces};
+  value_or_fail(export_surgery(options));
+  EXPECT_THAT(names(options.out), UnorderedElementsAre("tumour.vtp", "cortex.vtp", "ventricles.vtp",
+                                                       "septa.vtp", "export.json"));
+  const auto septa = value_or_fail(io::read_surface(options.out / "septa.vtp"));
+  EXPECT_EQ(septa.triangles.cols(), 3);
 }
 
 TEST_F(ExportSurgery, TheGridOfAnImageIsTaken) {

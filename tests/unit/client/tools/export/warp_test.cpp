@@ -118,14 +118,15 @@ TEST(DeformedSurface, TumourAndCortexMoveWithTheirField) {
   const Uncertainty of{sd, 0.5 * sd};
   ASSERT_GT(model.tumour.num_vertices(), 20);
   expect_moved(deformed_tumour(model, u, of), model.tumour);
-  expect_moved(deformed_cortex(model, u, of), geometry::boundary_surface(model.mesh));
+  expect_moved(deformed_triangles(model, model.boundary_triangles, u, of),
+               geometry::boundary_surface(model.mesh));
 }
 
 TEST(DeformedSurface, WithoutUncertaintyThereIsNoSuchField) {
   const BrainModel model = test_support::toy_patient(3);
   const Points u = Points::Zero(3, model.mesh.num_nodes());
   EXPECT_EQ(deformed_tumour(model, u, {}).vertex_fields.size(), 1u);
-  EXPECT_EQ(deformed_cortex(model, u, {}).vertex_fields.size(), 1u);
+  EXPECT_EQ(deformed_triangles(model, model.boundary_triangles, u, {}).vertex_fields.size(), 1u);
 }
 
 }  // namespace
