@@ -73,7 +73,7 @@ enum class PriorPart {
   kCoarse,  // longest
   kFar,     // what of the medium and coarse fields lies far from where data come from
 };
-inline constexpr int kPriorParts = 14;
+inline constexpr int kPriorParts = static_cast<int>(PriorPart::kFar) + 1;
 // "along_gravity", "across_gravity", "gravity_sides", "gravity_ends", "tumour_volume",
 // "brain_volume", "resection", "opening", "ventricles", "tract", "fine", "medium", "coarse", "far"
 std::string_view to_string(PriorPart part);
@@ -84,7 +84,11 @@ using PriorScaleValues = PerPart<double>;
 // The residual fields, one for each correlation length and the far one: the last parts.
 inline constexpr int kRemainders = 4;
 inline constexpr int kLoadParts = kPriorParts - kRemainders;
-inline constexpr PriorScaleValues kAsInTheCase = {1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1};
+inline constexpr PriorScaleValues kAsInTheCase = [] {
+  PriorScaleValues ones{};
+  for (double& scale : ones) scale = 1.0;
+  return ones;
+}();
 
 // One set of strengths, and how probable the data make it.
 struct Hypothesis {

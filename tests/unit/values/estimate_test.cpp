@@ -37,6 +37,13 @@ TEST(Estimate, HasNotRunByDefault) {
   EXPECT_TRUE(std::isnan(Estimate{}.min_nodal_volume_ratio));
 }
 
+TEST(Estimate, EveryPartOfThePriorBeginsAsInTheCase) {
+  for (const double scale : kAsInTheCase) EXPECT_EQ(scale, 1.0);
+  for (int part = 0; part < kPriorParts; ++part) {
+    EXPECT_NE(to_string(static_cast<PriorPart>(part)), "unknown") << part;
+  }
+}
+
 TEST(AnswerTime, IsLateBeyondTwiceTheUsual) {
   EXPECT_FALSE((AnswerTime{200.0, 100.0}.late()));
   EXPECT_TRUE((AnswerTime{200.5, 100.0}.late()));
