@@ -112,6 +112,27 @@ void fill(std::vector<std::uint8_t>& regions, const std::array<int, 3>& dims) {
   }
 }
 
+// Labels of the left must lie left of those of the right: x grows to the patient's right.
+Status check_sides(const VoxelImage& map, const std::string& what) {
+  double sum[2] = {}, count[2] = {};
+  for (std::size_t v = 0; v < map.values.size(); ++v) {
+    const int label = whole(map.values[v]);
+    if (structure_of(label) != Structure::kCerebrum || side_of(label) == Side::kNone) continue;
+    const std::size_t side = side_of(label) == Side::kLeft ? 0 : 1;
+    const auto nx = static_cast<std::size_t>(map.dims[0]),
+               ny = static_cast<std::size_t>(map.dims[1]);
+    const Vec3 voxel(static_cast<double>(v % nx), static_cast<double>(v / nx % ny),
+                     static_cast<double>(v / nx / ny));
+    sum[side] += (map.T_ras_voxel * voxel).x();
+    count[side] += 1.0;
+  }
+  if (count[0] == 0.0 || count[1] == 0.0 || sum[0] / count[0] < sum[1] / count[1]) return {};
+  return invalid(fmt::format(
+      "{}: labels of the left hemisphere lie right of those of the right one (middles at R {:.0f} "
+      "and {:.0f} mm): the map is mirrored, or its numbers are",
+      what, sum[0] / count[0], sum[1] / count[1]));
+}
+
 Status check_map(const VoxelImage& map, const AnatomyConfig& wanted, const std::string& what,
                  Notes* notes) {
   std::set<int> labels;
@@ -142,6 +163,7 @@ Status check_map(const VoxelImage& map, const AnatomyConfig& wanted, const std::
                     "which falx and tentorium need (anatomy.septa: off leaves them out)",
                     what));
   }
+  if (Status sides = check_sides(map, what); !sides) return sides;
   std::set<int> strange;
   std::copy_if(labels.begin(), labels.end(), std::inserter(strange, strange.end()),
                [&](int label) { return label != 0 && structure_of(label) == Structure::kOther; });

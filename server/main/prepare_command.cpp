@@ -74,6 +74,10 @@ Result<CaseConfig> check_arguments(const PrepareArguments& arguments,
   for (const std::filesystem::path& path : {arguments.out, checkpoint}) {
     if (auto ok = io::check_output_file("--out", path); !ok) return tl::unexpected(ok.error());
   }
+  std::error_code ignored;
+  if (std::filesystem::equivalent(arguments.out, arguments.case_file, ignored)) {
+    return invalid("--out: " + arguments.out.string() + ": is the case itself");
+  }
   auto config = io::read_case_config(arguments.case_file);
   if (!config) return config;
   if (auto plan = pipeline::plan_scene(*config, Method::kCondensed, Boundary::kContact); !plan) {

@@ -36,6 +36,14 @@ Status check_ultrasound_options(const UltrasoundRegisterOptions& options) {
   }
   Status place = check_error_place(options.case_file, options.model, options.target);
   if (!place) return place;
+  if (!options.picture.empty() &&
+      options.picture.lexically_normal() == options.out.lexically_normal()) {
+    return invalid("--picture and --out are one file: " + options.out.string());
+  }
+  if (options.picture.empty() && options.out.extension() == ".png") {
+    return invalid("--out: " + options.out.string() +
+                   ": is the name of the picture; the transform is a text file");
+  }
   if (options.target && options.brain.empty()) {
     return invalid(
         "--target needs --brain, the brain's mask: skull and scalp, which ultrasound does not "

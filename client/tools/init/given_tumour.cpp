@@ -23,6 +23,9 @@
 namespace brainshift::client {
 namespace {
 
+// Numbers of labels are far below; what single precision counts to.
+constexpr float kLargestLabel = 16777216.0F;
+
 std::set<int> labels_in(const VoxelImage& image) {
   std::set<int> labels;
   for (const float v : image.values) {
@@ -119,6 +122,20 @@ std::string listed_segments(const io::LabelNames& names) {
   return list;
 }
 
+Status same_frame(const TumourFile& given, const std::string& own, const MriIdentity& mri) {
+  if (own.empty() || mri.frame_of_reference.empty() || own == mri.frame_of_reference) return {};
+  return invalid(given.file.string() +
+                 ": was drawn in another frame of reference (0020,0052) than --mri: its places "
+                 "are not those of this MRI");
+}
+
+// Without labels of which the map has no voxel: they lie within others that were chosen.
+std::vector<int> left_in(const VoxelImage& map, std::vector<int> labels) {
+  const std::set<int> there = labels_in(map);
+  std::erase_if(labels, [&](int label) { return there.count(label) == 0; });
+  return labels;
+}
+
 // Number, name and volume of each structure, or why it has none.
 std::string listed_structures(const io::DicomStructures& set, const VoxelImage& grid) {
   std::string list;
@@ -131,9 +148,11 @@ std::string listed_structures(const io::DicomStructures& set, const VoxelImage& 
   return list;
 }
 
-// The structures as labels by their numbers on the grid; where several lie, the last one chosen.
+// The structures as labels, their numbers and `more`, on the grid; where several lie, the last one
+// chosen.
 Result<VoxelImage> structure_map(const io::DicomStructures& set, const std::vector<int>& numbers,
-                                 const VoxelImage& grid, std::vector<std::string>& notes) {
+                                 int more, const VoxelImage& grid,
+                                 std::vector<std::string>& notes) {
   VoxelImage map;
   map.dims = grid.dims, map.T_ras_voxel = grid.T_ras_voxel;
   map.values.assign(grid.num_voxels(), 0.0F);
@@ -147,7 +166,7 @@ Result<VoxelImage> structure_map(const io::DicomStructures& set, const std::vect
     const auto filled = io::fill_contours(one->contours, grid);
     if (!filled) return fail(filled.error().code, name + ": " + filled.error().message);
     for (std::size_t v = 0; v < map.values.size(); ++v) {
-      if (filled->mask.values[v] > 0.0F) map.values[v] = static_cast<float>(number);
+      if (filled->mask.values[v] > 0.0F) map.values[v] = static_cast<float>(number + more);
     }
     notes.push_back(fmt::format("{}, from {} contours in {} planes {:.2f} mm apart", name,
                                 one->contours.size(), filled->planes, filled->spacing_mm));
@@ -160,11 +179,8 @@ Result<GivenTumour> from_structures(const TumourFile& given, const VoxelImage& g
                                     const MriIdentity& mri) {
   const auto set = io::read_dicom_structures(given.file);
   if (!set) return tl::unexpected(set.error());
-  if (!set->frame_of_reference.empty() && !mri.frame_of_reference.empty() &&
-      set->frame_of_reference != mri.frame_of_reference) {
-    return invalid(given.file.string() +
-                   ": was drawn in another frame of reference (0020,0052) than --mri: its places "
-                   "are not those of this MRI");
+  if (Status same = same_frame(given, set->frame_of_reference, mri); !same) {
+    return tl::unexpected(same.error());
   }
   io::LabelNames names;
   for (const io::DicomStructure& one : set->structures) names[one.number] = one.name;
@@ -172,22 +188,38 @@ Result<GivenTumour> from_structures(const TumourFile& given, const VoxelImage& g
       only_or_named(given, names, "structure", [&] { return listed_structures(*set, grid); });
   if (!choice) return tl::unexpected(choice.error());
   GivenTumour tumour{{}, choice->labels, choice->why, {}, true};
-  auto map = structure_map(*set, choice->labels, grid, tumour.notes);
+  // 0 is the background of a map.
+  const int more = names.empty() ? 0 : std::max(0, 1 - names.begin()->first);
+  auto map = structure_map(*set, choice->labels, more, grid, tumour.notes);
   if (!map) return io::file_error(given.file, map.error());
   if (!set->series.empty() && !mri.series.empty() && set->series != mri.series) {
     tumour.notes.emplace_back("drawn on another series in the MRI's frame of reference");
   }
+  for (int& label : tumour.labels) label += more;
+  if (more > 0) {
+    tumour.notes.push_back(fmt::format("labels are the structures' numbers and {}", more));
+  }
+  tumour.labels = left_in(*map, tumour.labels);
   tumour.map = std::move(*map);
   return tumour;
 }
 
-Result<GivenTumour> from_segments(const TumourFile& given) {
+Result<GivenTumour> from_segments(const TumourFile& given, const MriIdentity& mri) {
   const auto seg = io::read_dicom_segmentation(given.file);
   if (!seg) return tl::unexpected(seg.error());
+  if (Status same = same_frame(given, seg->frame_of_reference, mri); !same) {
+    return tl::unexpected(same.error());
+  }
+  if (!seg->names.empty() && seg->names.begin()->first < 1) {
+    return invalid(given.file.string() +
+                   ": a segment has no number (0062,0004) from 1 on, as DICOM numbers them");
+  }
   const auto choice =
       only_or_named(given, seg->names, "segment", [&] { return listed_segments(seg->names); });
   if (!choice) return tl::unexpected(choice.error());
-  return GivenTumour{io::label_map(*seg, choice->labels), choice->labels, choice->why, {}, true};
+  VoxelImage map = io::label_map(*seg, choice->labels);
+  std::vector<int> labels = left_in(map, choice->labels);
+  return GivenTumour{std::move(map), std::move(labels), choice->why, {}, true};
 }
 
 }  // namespace
@@ -196,12 +228,21 @@ Result<GivenTumour> read_tumour(const TumourFile& given, const VoxelImage& grid,
                                 const MriIdentity& mri) {
   if (io::is_dicom(given.file)) {
     return io::is_dicom_structures(given.file) ? from_structures(given, grid, mri)
-                                               : from_segments(given);
+                                               : from_segments(given, mri);
   }
   auto map = io::read_label_map(given.file, {given.segment, 1});
   if (!map) return tl::unexpected(map.error());
+  for (const float v : map->values) {
+    if (std::isfinite(v) && std::abs(v) >= kLargestLabel) {
+      return invalid(
+          fmt::format("{}: is no label map: it has the value {:g}", given.file.string(), v));
+    }
+  }
   const auto choice = tumour_labels(given, *map);
   if (!choice) return tl::unexpected(choice.error());
+  if (std::find(choice->labels.begin(), choice->labels.end(), 0) != choice->labels.end()) {
+    return invalid("--tumour-label: 0: is the background of " + given.file.string());
+  }
   return GivenTumour{std::move(*map),
                      choice->labels,
                      given.segment.empty() ? choice->why : "the segment",

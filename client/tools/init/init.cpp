@@ -30,7 +30,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr double kMm3PerCc = 1000.0;
+constexpr double kMm3PerCc = 1000.0, kLargestTumour = 0.5;  // of the brain
 constexpr double kLowest_mm = 8.0;
 constexpr double kStemHalfWidth_mm = 15.0;
 constexpr double kStemRadius_mm = 14.0;
@@ -221,6 +221,16 @@ Status guess_tumour(Draft& draft, const VoxelImage& brain) {
   if (!foci) return tl::unexpected(foci.error());
   double mm3 = 0.0;
   for (const anatomy::Focus& focus : *foci) mm3 += focus.volume_mm3;
+  const double brain_mm3 =
+      std::abs(brain.T_ras_voxel.linear().determinant()) *
+      static_cast<double>(std::count_if(brain.values.begin(), brain.values.end(),
+                                        [](float v) { return v > 0.0F; }));
+  if (mm3 > kLargestTumour * brain_mm3) {
+    return invalid(
+        fmt::format("{}: the tumour has {:.0f} cc ({}) of a brain of {:.0f} cc: is it "
+                    "the background, or the brain?",
+                    options.tumour.string(), mm3 / kMm3PerCc, given->why, brain_mm3 / kMm3PerCc));
+  }
   draft.about_tumour = fmt::format("{:.2f} cc ({}).", mm3 / kMm3PerCc, given->why);
   for (const std::string& note : given->notes) draft.about_tumour += " " + note + ".";
   for (const std::string& note : notes) {
@@ -322,17 +332,34 @@ Status take_gravity(Draft& draft) {
 Result<std::vector<fs::path>> write_files(const Draft& draft, const VoxelImage& brain,
                                           const std::string& text) {
   const InitOptions& options = draft.options;
-  std::vector<fs::path> files;
-  const auto write = [&](const fs::path& path, const VoxelImage& image, const char* note) {
-    files.push_back(path);
-    return io::write_nifti(path, {{image.dims, image.T_ras_voxel}, image.values, note});
+  struct Volume {
+    fs::path path;
+    const VoxelImage* image;
+    const char* note;
   };
+  std::vector<Volume> volumes;
+  if (draft.series) volumes.push_back({draft.mri, &draft.series->image, "from DICOM"});
+  if (draft.segments) volumes.push_back({draft.tumour_file, &*draft.segments, "from DICOM"});
+  if (options.brain.empty()) volumes.push_back({draft.brain, &brain, "brain mask"});
+  // A user's file, or one that was corrected by hand since.
+  for (const Volume& volume : volumes) {
+    std::error_code ignored;
+    if (!fs::exists(fs::symlink_status(volume.path, ignored))) continue;
+    return invalid("--out: " + volume.path.string() + ": exists; a volume is never replaced");
+  }
+  std::vector<fs::path> files;
   Status ok;
-  if (draft.series) ok = write(draft.mri, draft.series->image, "from DICOM");
-  if (ok && draft.segments) ok = write(draft.tumour_file, *draft.segments, "from DICOM");
-  if (ok && options.brain.empty()) ok = write(draft.brain, brain, "brain mask");
+  for (const auto& [path, image, note] : volumes) {
+    files.push_back(path);
+    ok = io::write_nifti(path, {{image->dims, image->T_ras_voxel}, image->values, note});
+    if (!ok) break;
+  }
   if (ok) ok = io::write_file(options.out, text);
-  if (!ok) return tl::unexpected(ok.error());
+  if (!ok) {
+    std::error_code ignored;
+    for (const fs::path& path : files) fs::remove(path, ignored);
+    return tl::unexpected(ok.error());
+  }
   files.push_back(options.out);
   return files;
 }

@@ -175,6 +175,7 @@ Result<DicomSegmentation> parse_segmentation(DcmDataset& data) {
     return unreadable("is DICOM, but no segmentation (SEG)");
   }
   DicomSegmentation result;
+  result.frame_of_reference = text_of(data, DCM_FrameOfReferenceUID);
   for (Sint32 i = 0; DcmItem* const item = item_of(&data, DCM_SegmentSequence, i); ++i) {
     Uint16 number = 0;
     item->findAndGetUint16(DCM_SegmentNumber, number);

@@ -23,6 +23,7 @@ struct DicomSegmentation {
   std::map<int, std::string> names;                   // of the segments, by number
   std::map<int, std::vector<std::uint8_t>> segments;  // 1 where a voxel belongs to it
   VoxelImage grid;                                    // without values
+  std::string frame_of_reference;                     // UID (0020,0052); empty: not said
 };
 
 // Whether a file is DICOM, by the word behind its preamble.

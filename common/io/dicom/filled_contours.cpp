@@ -15,7 +15,7 @@ namespace brainshift::io {
 namespace {
 
 constexpr double kLeastArea_mm2 = 1e-3;
-constexpr double kSamePlace_mm = 1e-3;
+constexpr double kSameOutline_mm = 0.3, kSameArea = 0.03;
 constexpr double kTurned_deg = 1.0;  // below, planes and slices count as parallel
 constexpr double kShifted = 0.05;    // of a slice's thickness
 
@@ -95,9 +95,10 @@ bool contours_cross(const Flat& a, const Flat& b) {
   return crossing;
 }
 
+// Drawn twice, with other points on the outline perhaps: a wall this thin is no ring.
 bool same_contour(const Flat& a, const Flat& b) {
-  return (a.low - b.low).norm() < kSamePlace_mm && (a.high - b.high).norm() < kSamePlace_mm &&
-         std::abs(a.area - b.area) < 1e-6 * a.area + kSamePlace_mm * kSamePlace_mm;
+  return (a.low - b.low).norm() < kSameOutline_mm && (a.high - b.high).norm() < kSameOutline_mm &&
+         std::abs(a.area - b.area) < kSameArea * std::max(a.area, b.area);
 }
 
 // Odd number of edges to the right of x; `on`: an edge passes through x.
@@ -134,6 +135,7 @@ Result<std::vector<Flat>> flattened(const std::vector<Points>& contours, Stack& 
   std::vector<Flat> flat;
   for (std::size_t c = 0; c < contours.size(); ++c) {
     const Points& contour = contours[c];
+    if (contour.cols() < 3) continue;
     Flat one;
     one.number = static_cast<int>(c) + 1;
     const VecX depths = contour.transpose() * stack.normal;
@@ -145,7 +147,7 @@ Result<std::vector<Flat>> flattened(const std::vector<Points>& contours, Stack& 
                       "up to {:.2f} mm out of it, {:g} mm are allowed",
                       one.number, out, kOutOfPlane_mm));
     }
-    one.area = contour.cols() > 2 ? area_vector(contour).norm() : 0.0;
+    one.area = area_vector(contour).norm();
     if (one.area < kLeastArea_mm2) continue;
     one.points.resize(2, contour.cols());
     for (Eigen::Index i = 0; i < contour.cols(); ++i)

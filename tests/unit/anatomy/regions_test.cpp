@@ -192,6 +192,8 @@ TEST(Regions, MapsThatCannotGiveWhatIsAskedForAreNamed) {
   EXPECT_THAT(refusal(labelled_case({{3, 42}, {2, 41}})),
               HasSubstr("anatomy.labels = 'labels.nii': does not tell the cortex of the left "
                         "hemisphere from that of the right"));
+  EXPECT_THAT(refusal(labelled_case({{2, 41}, {3, 42}, {41, 2}, {42, 3}})),
+              HasSubstr("labels of the left hemisphere lie right of those of the right one"));
   CaseInputs unknown = labelled_case();
   for (float& v : unknown.labels->values) v = v > 0.0F ? 507.0F : 0.0F;
   EXPECT_THAT(refusal(unknown), HasSubstr("no label is of the cerebrum by anatomy.numbers = "

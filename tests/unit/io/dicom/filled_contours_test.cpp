@@ -115,6 +115,12 @@ TEST(FilledContours, AGapStaysEmptyAndIsTold) {
                                                "2.0 mm are usual")));
 }
 
+TEST(FilledContours, AContourOfFewerThanThreePointsIsNone) {
+  const auto filled =
+      fill({Points(3, 0), square(Vec3(0.5, 0.5, 4), 3.0), Points::Ones(3, 2)}, grid(1.0));
+  EXPECT_EQ(filled_mm3(filled), 36.0);
+}
+
 TEST(FilledContours, WhatIsWrongIsNamed) {
   Points bent = square(Vec3(0, 0, 0), 5.0);
   bent(2, 1) += 0.9;
@@ -128,6 +134,8 @@ TEST(FilledContours, WhatIsWrongIsNamed) {
   EXPECT_THAT(
       refusal({square(Vec3(0, 0, 0), 5.0), square(Vec3(0, 0, 1), 5.0), square(Vec3(0, 0, 0), 5.0)}),
       HasSubstr("contours 1 and 3 are the same"));
+  EXPECT_THAT(refusal({polygon(Vec3(0, 0, 0), 12.0, 90), polygon(Vec3(0, 0, 0), 11.95, 61)}),
+              HasSubstr("contours 1 and 2 are the same"));
   EXPECT_THAT(refusal({square(Vec3(40, 0, 0), 5.0)}),
               AllOf(HasSubstr("100 % of its points"), HasSubstr("another series")));
   EXPECT_THAT(refusal({square(Vec3(0.5, 0.5, 0), 0.2)}), HasSubstr("no voxel"));

@@ -4,6 +4,8 @@
 #include <gmock/gmock.h>
 
 #include <cstdlib>
+#include <filesystem>
+#include <fstream>
 
 #include "client/tools/preview/case_view.hpp"
 #include "common/io/config/config_file.hpp"
@@ -126,6 +128,43 @@ TEST_F(FirstCase, SeveralLabelsMustBeChosenByNumberOrByNameOfTheirTable) {
   EXPECT_THAT(refusal(), HasSubstr("(\"Core\", \"Rim\")"));
   options.tumour_label = "core,14";
   EXPECT_THAT(std::get<TumourLabel>(written().tumour).labels, ElementsAre(11, 14));
+}
+
+TEST_F(FirstCase, TheBackgroundIsNoTumour) {
+  options.tumour_label = "0";
+  EXPECT_THAT(refusal(), HasSubstr("--tumour-label: 0: is the background"));
+  options.tumour_label.clear();
+  put("tumour.nii", drawn([](const Vec3& x) { return lesion_at(x) > 0.0F ? 0.0F : 1.0F; }));
+  EXPECT_THAT(refusal(), HasSubstr("is it the background, or the brain?"));
+  put("tumour.nii", drawn([](const Vec3& x) { return lesion_at(x) == 1.0F ? 1e30F : 0.0F; }));
+  EXPECT_THAT(refusal(), HasSubstr("is no label map: it has the value 1e+30"));
+}
+
+TEST_F(FirstCase, AVolumeThatIsThereIsNeverReplacedAndNothingIsLeftBehind) {
+  const std::string mine = "my own mask";
+  std::ofstream(folder / "case-brain.nii.gz") << mine;
+  EXPECT_THAT(refusal(), HasSubstr("case-brain.nii.gz: exists; a volume is never replaced"));
+  EXPECT_EQ(test_support::content_of(folder / "case-brain.nii.gz"), mine);
+  EXPECT_FALSE(std::filesystem::exists(options.out));
+}
+
+TEST_F(FirstCase, ATumourWithinAnotherThatIsChosenIsOfTheWhole) {
+  test_support::StructureSet set;
+  for (const auto& [number, half] : {std::pair{0, 6.0}, {1, 12.0}}) {
+    test_support::DrawnStructure one{number, number == 0 ? "GTV" : "CTV", {}};
+    for (const double s : {27.0, 30.0, 33.0}) {
+      one.contours.push_back({(Points(3, 4) << 40 - half, 40 + half, 40 + half, 40 - half, -half,
+                               -half, half, half, s, s, s, s)
+                                  .finished()});
+    }
+    set.structures.push_back(one);
+  }
+  test_support::write_structure_set(folder / "rs.dcm", set);
+  options.tumour = folder / "rs.dcm";
+  options.tumour_label = "GTV,CTV";
+  const CaseConfig config = written();
+  // Structure 0 has label 1; it lies within structure 1, whose label is 2.
+  EXPECT_THAT(std::get<TumourLabel>(config.tumour).labels, ElementsAre(2));
 }
 
 TEST_F(FirstCase, LabelsOfAnotherNumberingAreRefusedByFile) {
