@@ -129,11 +129,13 @@ Status same_frame(const TumourFile& given, const std::string& own, const MriIden
                  "are not those of this MRI");
 }
 
-// Without labels of which the map has no voxel: they lie within others that were chosen.
-std::vector<int> left_in(const VoxelImage& map, std::vector<int> labels) {
+// Without labels of which the map has no voxel: they lie within others that were chosen. All of
+// them where it has none at all, which anatomy::tumour_foci refuses by name.
+std::vector<int> left_in(const VoxelImage& map, const std::vector<int>& labels) {
   const std::set<int> there = labels_in(map);
-  std::erase_if(labels, [&](int label) { return there.count(label) == 0; });
-  return labels;
+  std::vector<int> left = labels;
+  std::erase_if(left, [&](int label) { return there.count(label) == 0; });
+  return left.empty() ? labels : left;
 }
 
 // Number, name and volume of each structure, or why it has none.

@@ -37,7 +37,7 @@ struct MriIdentity {
   std::string frame_of_reference, series;
 };
 
-// grid: of the MRI. A structure set must have been drawn in the MRI's frame of reference.
+// grid: of the MRI. What DICOM drew must lie in the MRI's frame of reference.
 // kInvalidArgument: labels that are not there (those that are, are listed with their volumes),
 // several and none chosen, another frame of reference. Errors of the readers and of
 // io::fill_contours.

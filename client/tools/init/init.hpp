@@ -41,10 +41,11 @@ struct InitSummary {
 };
 
 // Writes the case, which io::read_case_config reads. kInvalidArgument: options that are missing
-// (all of them in one sentence), a case that is there already, a position, labels that the
-// tumour's map does not have (those that it has are listed), several labels and none chosen where
-// they are not BraTS's (1, 2 and 3 or 4: then all but 2, oedema), a structure set of another frame
-// of reference than the series. Errors of the readers and of io::fill_contours; kWriteFailed.
+// (all of them in one sentence), a case or volume that is there already, a position, labels that
+// the tumour's map does not have (those that it has are listed), several labels and none chosen
+// where they are not BraTS's (1, 2 and 3 or 4: then all but 2, oedema), a segmentation or structure
+// set of another frame of reference than the series, a tumour of more than half the brain. Errors
+// of the readers and of io::fill_contours; kWriteFailed.
 Result<InitSummary> write_first_case(const InitOptions& options);
 
 // As above. outward: the direction in which the place is outermost; unit.
