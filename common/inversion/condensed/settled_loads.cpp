@@ -23,6 +23,8 @@ constexpr double kSameVariance = 0.1;
 // there than the case says, as a part of the displacement: 0.09 to 0.15 in sag, 0.07 to 0.28 where
 // tissue swells (decisions 0018, 0037). The first value counts before any load is known.
 constexpr double kModelError = 0.1, kModelErrorOfVolume = 0.3;
+// How much larger it is where no data correct the model (chosen on trial surgeries; decision 0037).
+constexpr double kFarModelError = 1.5;
 constexpr bool is_volume(PriorPart part) {
   return part == PriorPart::kTumourVolume || part == PriorPart::kBrainVolume;
 }
@@ -275,7 +277,7 @@ bool SettledLoads::set_model_error_floor_of_loads() {
 void SettledLoads::set_floor(double of_medium) {
   strengths_.set_floor(PriorPart::kMedium, of_medium);
   if (far_sd_mm_ > 0.0) {
-    strengths_.set_floor(PriorPart::kFar, of_medium * medium_sd_mm_ / far_sd_mm_);
+    strengths_.set_floor(PriorPart::kFar, kFarModelError * of_medium * medium_sd_mm_ / far_sd_mm_);
   }
 }
 
