@@ -8,9 +8,10 @@
 #   RESUME=1         keep the surgeries that OUT_DIR has, after an interruption
 #   BEFORE=DIR       rows-*.csv of an earlier estimate on the same surgeries, to compare with
 #                    (default: docs/surgeries/before)
-#   KINDS=a,b        these kinds of truths from outside, and no scenario (docs/surgeries.md)
+#   KINDS=a,b        these kinds of truths from outside, or all, and no scenario (docs/surgeries.md)
 #   FIXED=1          estimate truths from outside with prior.scales: fixed too, in OUT_DIR-fixed, and hold the
 #                    default's interval score against it
+#   SEEDS=N          surgeries of a place and kind (default: 4; docs/surgeries.md publishes truths from outside with 2)
 #   THOUSAND_NODES=N meshes of about so many thousand nodes (default: those of the case files, 18)
 #   QUICK=1          2 places x 2 seeds, from 1001 and 1101, on 6 thousand nodes
 set -euo pipefail
@@ -30,6 +31,7 @@ if [ "${QUICK:-0}" = 1 ]; then
   first=1001
 fi
 if [ -n "${THOUSAND_NODES:-}" ]; then options+=(--thousand-nodes "$THOUSAND_NODES"); fi
+if [ -n "${SEEDS:-}" ]; then options+=(--seeds "$SEEDS"); fi
 if [ -n "${KINDS:-}" ]; then
   options+=(--kinds "$KINDS")
 fi
