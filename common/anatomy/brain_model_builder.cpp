@@ -229,14 +229,15 @@ std::string named_labels(const CaseConfig& config) {
 }
 
 // Null without a label map, or where nothing of it is asked for.
-Result<std::unique_ptr<Regions>> regions_of(const CaseInputs& inputs, Notes* notes) {
+Result<std::unique_ptr<Regions>> regions_of(const CaseInputs& inputs, const TriangleSurface& tumour,
+                                            Notes* notes) {
   const AnatomyConfig& wanted = inputs.config.anatomy;
   const bool any = wanted.tissues || wanted.septa || wanted.ventricles;
   if (!wanted.labels || !any) return std::unique_ptr<Regions>();
   const std::string what = named_labels(inputs.config);
   if (!inputs.labels) return invalid(what + ": was not read");
   const auto& settings = std::get<MeshGeneration>(inputs.config.mesh);
-  auto made = Regions::build(inputs.config, *inputs.labels, inputs.label_names,
+  auto made = Regions::build(inputs, tumour,
                              std::max(settings.smoothing_mm, kSmoothingOverEdge * settings.edge_mm),
                              what, notes);
   if (!made) return tl::unexpected(made.error());
@@ -328,7 +329,7 @@ Result<BrainModel> build_brain_model(const CaseInputs& inputs, const Progress& p
   auto tumour = make_tumour_surface(inputs, notes);
   if (!tumour) return tl::unexpected(tumour.error());
 
-  auto regions = regions_of(inputs, notes);
+  auto regions = regions_of(inputs, *tumour, notes);
   if (!regions) return tl::unexpected(regions.error());
   auto mesh = make_brain_mesh(inputs, *tumour, progress, notes, regions->get());
   if (!mesh) return tl::unexpected(mesh.error());

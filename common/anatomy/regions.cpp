@@ -11,7 +11,9 @@
 #include <utility>
 
 #include "common/configuration/case_keys.hpp"
+#include "common/geometry/closest_point.hpp"
 #include "common/geometry/mask.hpp"
+#include "common/geometry/surface.hpp"
 
 namespace brainshift::anatomy {
 
@@ -188,26 +190,146 @@ Status check_map(const VoxelImage& map, const AnatomyConfig& wanted, const std::
   return {};
 }
 
-}  // namespace
-
-Result<Regions> Regions::build(const CaseConfig& config, const VoxelImage& labels,
-                               const std::map<int, std::string>& names, double smoothing_mm,
-                               const std::string& what, Notes* notes) {
-  const AnatomyConfig& wanted = config.anatomy;
-  if (wanted.numbers == LabelNumbers::kAal) {
-    return build_from(wanted, with_freesurfer_numbers_of_aal(labels), smoothing_mm, what, notes);
-  }
-  if (names.empty()) return build_from(wanted, labels, smoothing_mm, what, notes);
-  const auto renamed = with_freesurfer_numbers(labels, names);
-  if (!renamed) return fail(renamed.error().code, what + ": " + renamed.error().message);
-  return build_from(wanted, *renamed, smoothing_mm, what, notes);
+// The voxels of an image at whose values `is` holds, as points of the head.
+template <typename Is, typename See>
+void for_each_voxel(const VoxelImage& image, const Is& is, const See& see) {
+  std::size_t v = 0;
+  for (int k = 0; k < image.dims[2]; ++k)
+    for (int j = 0; j < image.dims[1]; ++j)
+      for (int i = 0; i < image.dims[0]; ++i, ++v) {
+        if (is(image.values[v])) see(v, Vec3(image.T_ras_voxel * Vec3(i, j, k)));
+      }
 }
 
-Result<Regions> Regions::build_from(const AnatomyConfig& wanted, const VoxelImage& map,
-                                    double smoothing_mm, const std::string& what, Notes* notes) {
+bool is_brain(float value) {
+  const Structure structure = structure_of(whole(value));
+  return structure != Structure::kOther && structure != Structure::kFluid;
+}
+
+// The 10 mm cells of a head that hold one of some points, and all within two cells of them.
+class Neighbourhood {
+ public:
+  void add(const Vec3& x) { cells_.insert(cell_of(x)); }
+  void grow() {
+    constexpr int kReach = 2;
+    std::set<Cell> grown;
+    for (const Cell& at : cells_)
+      for (int k = -kReach; k <= kReach; ++k)
+        for (int j = -kReach; j <= kReach; ++j)
+          for (int i = -kReach; i <= kReach; ++i) grown.insert({at[0] + i, at[1] + j, at[2] + k});
+    cells_.swap(grown);
+  }
+  bool has(const Vec3& x) const { return cells_.count(cell_of(x)) != 0; }
+
+ private:
+  using Cell = std::array<int, 3>;
+  static Cell cell_of(const Vec3& x) {
+    const auto of = [&x](int a) { return static_cast<int>(std::floor(x[a] / 10.0)); };
+    return {of(0), of(1), of(2)};
+  }
+  std::set<Cell> cells_;
+};
+
+// A map of another head, or of this one elsewhere, puts septa and ventricles where none are.
+Status check_fit(const VoxelImage& map, const CaseInputs& inputs, const std::string& what) {
+  if (!inputs.brain) return {};  // the mesher tells
+  const VoxelImage& brain = *inputs.brain;
+  const AffineTransform T_voxel_ras = brain.T_ras_voxel.inverse();
+  const auto in_mask = [&](const Vec3& x) {
+    const Vec3 place = T_voxel_ras * x;
+    std::array<int, 3> at{};
+    for (std::size_t a = 0; a < 3; ++a) {
+      at[a] = static_cast<int>(std::lround(place[static_cast<Eigen::Index>(a)]));
+      if (at[a] < 0 || at[a] >= brain.dims[a]) return false;
+    }
+    return brain.at(at[0], at[1], at[2]) > 0.0F;
+  };
+  Neighbourhood labelled;
+  double labels = 0.0, outside = 0.0;
+  for_each_voxel(map, is_brain, [&](std::size_t, const Vec3& x) {
+    labels += 1.0;
+    labelled.add(x);
+    bool near = in_mask(x);
+    for (int d = 0; !near && d < 27; ++d) {
+      const Vec3 way(d % 3 - 1, d / 3 % 3 - 1, d / 9 - 1);
+      near = d != 13 && in_mask(x + Regions::kSlack_mm * way.normalized());
+    }
+    outside += near ? 0.0 : 1.0;
+  });
+  const std::string mask = fmt::format("images.brain = '{}'", inputs.config.brain.string());
+  if (outside > Regions::kFarLabels * labels) {
+    return invalid(fmt::format(
+        "{}: {:.0f} % of its brain lie more than {:g} mm outside the mask of {}: must be at most "
+        "{:.0f} %; is it of the same head, and in the same space?",
+        what, 100.0 * outside / labels, Regions::kSlack_mm, mask, 100.0 * Regions::kFarLabels));
+  }
+  labelled.grow();
+  double voxels = 0.0, far = 0.0;
+  for_each_voxel(
+      brain, [](float v) { return v > 0.0F; },
+      [&](std::size_t, const Vec3& x) {
+        voxels += 1.0;
+        far += labelled.has(x) ? 0.0 : 1.0;
+      });
+  if (far > Regions::kFarBrain * voxels) {
+    return invalid(
+        fmt::format("{}: {:.0f} % of the mask of {} lie more than 20 mm from any label "
+                    "of the brain: must be at most {:.0f} %; is a part missing?",
+                    what, 100.0 * far / voxels, mask, 100.0 * Regions::kFarBrain));
+  }
+  return {};
+}
+
+// Takes a ventricle's label from voxels inside the tumour. `map`: the one of `regions`.
+Status keep_tumour(std::vector<std::uint8_t>& regions, const VoxelImage& map,
+                   const TriangleSurface& tumour, const std::string& what, Notes* notes) {
+  if (std::find(regions.begin(), regions.end(), kVentricleRegion) == regions.end()) return {};
+  if (!geometry::is_closed(tumour)) return {};
+  const auto index = geometry::ClosestPointIndex::build(tumour);
+  if (!index) return tl::unexpected(index.error());
+  const Vec3 low = tumour.vertices.rowwise().minCoeff();
+  const Vec3 high = tumour.vertices.rowwise().maxCoeff();
+  std::size_t taken = 0;
+  for_each_voxel(map, is_brain, [&](std::size_t v, const Vec3& x) {
+    if (regions[v] != kVentricleRegion) return;
+    if ((x.array() < low.array()).any() || (x.array() > high.array()).any()) return;
+    if (!index->contains(x)) return;
+    regions[v] = 0;
+    ++taken;
+  });
+  const double mm3 = static_cast<double>(taken) * std::abs(map.T_ras_voxel.linear().determinant());
+  if (taken > 0) {
+    add_note(notes, fmt::format("{}: {:.2f} cc of the tumour lie in ventricles; they are tissue",
+                                what, mm3 / 1e3));
+  }
+  return {};
+}
+
+}  // namespace
+
+Result<Regions> Regions::build(const CaseInputs& inputs, const TriangleSurface& tumour,
+                               double smoothing_mm, const std::string& what, Notes* notes) {
+  const VoxelImage& labels = *inputs.labels;
+  if (inputs.config.anatomy.numbers == LabelNumbers::kAal) {
+    return build_from(inputs, with_freesurfer_numbers_of_aal(labels), tumour, smoothing_mm, what,
+                      notes);
+  }
+  if (inputs.label_names.empty()) {
+    return build_from(inputs, labels, tumour, smoothing_mm, what, notes);
+  }
+  const auto renamed = with_freesurfer_numbers(labels, inputs.label_names);
+  if (!renamed) return fail(renamed.error().code, what + ": " + renamed.error().message);
+  return build_from(inputs, *renamed, tumour, smoothing_mm, what, notes);
+}
+
+Result<Regions> Regions::build_from(const CaseInputs& inputs, const VoxelImage& map,
+                                    const TriangleSurface& tumour, double smoothing_mm,
+                                    const std::string& what, Notes* notes) {
+  const AnatomyConfig& wanted = inputs.config.anatomy;
   if (Status status = check_map(map, wanted, what, notes); !status) {
     return tl::unexpected(status.error());
   }
+  if (Status fits = check_fit(map, inputs, what); !fits) return tl::unexpected(fits.error());
   const VoxelImage cut = cut_to_labels(map);
   auto kept = std::make_shared<Labels>();
   kept->dims = cut.dims;
@@ -229,6 +351,9 @@ Result<Regions> Regions::build_from(const AnatomyConfig& wanted, const VoxelImag
           static_cast<std::uint8_t>(region_of(entry->first, wanted, made.tells_matter_));
     }
     regions[v] = entry->second;
+  }
+  if (Status kept_tissue = keep_tumour(regions, cut, tumour, what, notes); !kept_tissue) {
+    return tl::unexpected(kept_tissue.error());
   }
   fill(regions, cut.dims);
 

@@ -17,7 +17,7 @@
 
 #include "common/anatomy/brain_labels.hpp"
 #include "common/anatomy/given_inputs.hpp"
-#include "common/configuration/case_config.hpp"
+#include "common/configuration/case_inputs.hpp"
 #include "common/core/error.hpp"
 #include "common/core/mesh.hpp"
 
@@ -49,13 +49,14 @@ inline Septum septum_between(int a, int b) {
 
 class Regions {
  public:
-  // labels: by the case's anatomy.numbers, or FreeSurfer's by the names of its table. what: key and
-  // file, for messages. kInvalidArgument, one line each: values that are no whole numbers, or that
-  // are no label of the brain; with septa a map that does not separate left from right, with
-  // ventricles one that has none. notes: what the map does not tell apart.
-  static Result<Regions> build(const CaseConfig& config, const VoxelImage& labels,
-                               const std::map<int, std::string>& names, double smoothing_mm,
-                               const std::string& what, Notes* notes);
+  // inputs.labels: by the case's anatomy.numbers, or FreeSurfer's by inputs.label_names. what: key
+  // and file, for messages. A ventricle's voxels inside the (closed) tumour are tissue. notes: what
+  // the map does not tell apart, and how much tumour lies in ventricles. kInvalidArgument, one line
+  // each: values that are no whole numbers, or that are no label of the brain; with septa a map
+  // that does not separate left from right; a map that does not fit the brain's mask (kFarLabels,
+  // kFarBrain).
+  static Result<Regions> build(const CaseInputs& inputs, const TriangleSurface& tumour,
+                               double smoothing_mm, const std::string& what, Notes* notes);
 
   // The region of a point of the head; any number within kRegions but never one that was not asked
   // for.
@@ -68,11 +69,16 @@ class Regions {
   bool parted(Septum septum, const Vec3& x) const;
 
   static constexpr double kReach_mm = 5.0, kClear_mm = 2.5;
+  // Of the map's brain the share that may lie farther than kSlack_mm outside the mask, of the mask
+  // the share that may lie farther than 20 mm from any label. AAL on its own head has 0.5 % outside;
+  // moved by 5 mm 4 to 5 %, by 10 mm 9 to 11 %.
+  static constexpr double kSlack_mm = 3.0, kFarLabels = 0.04, kFarBrain = 0.05;
 
  private:
   struct Labels;  // the map, cut to the head
-  static Result<Regions> build_from(const AnatomyConfig& wanted, const VoxelImage& map,
-                                    double smoothing_mm, const std::string& what, Notes* notes);
+  static Result<Regions> build_from(const CaseInputs& inputs, const VoxelImage& map,
+                                    const TriangleSurface& tumour, double smoothing_mm,
+                                    const std::string& what, Notes* notes);
   std::shared_ptr<const Labels> labels_;
   std::array<int, 3> dims_{};  // of the smoothed values
   AffineTransform T_voxel_ras_ = AffineTransform::Identity();

@@ -6,6 +6,8 @@
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <map>
+#include <numeric>
+#include <set>
 #include <utility>
 
 #include "common/geometry/closest_point.hpp"
@@ -61,6 +63,50 @@ std::vector<char> cavities(const TetMesh& mesh, const std::string& what, Notes* 
                                 kSmallestVentricle_mm3 / 1e3));
   }
   return taken;
+}
+
+// Takes tissue that stands in ventricles and touches no other.
+void take_islands(const TetMesh& mesh, std::vector<char>& taken, const std::string& what,
+                  Notes* notes) {
+  std::vector<int> tissue;
+  for (int t = 0; t < mesh.num_tets(); ++t) {
+    if (!taken[at(t)]) tissue.push_back(t);
+  }
+  const geometry::TetComponents parts = geometry::tet_components(mesh.tets(Eigen::all, tissue));
+  if (parts.sizes.size() < 2) return;
+  const auto brain = std::max_element(parts.sizes.begin(), parts.sizes.end());
+  const auto largest = static_cast<int>(brain - parts.sizes.begin());
+  double islands_mm3 = 0.0;
+  for (std::size_t i = 0; i < tissue.size(); ++i) {
+    if (parts.component_of_tet[i] == largest) continue;
+    taken[at(tissue[i])] = 1;
+    islands_mm3 += geometry::tet_volume(mesh, tissue[i]);
+  }
+  add_note(notes, fmt::format("{}: {} parts of tissue, of {:.2f} cc together, stand in ventricles "
+                              "without touching the brain; they are ventricle",
+                              what, parts.sizes.size() - 1, islands_mm3 / 1e3));
+}
+
+// kInvalidArgument: the tumour has lost its tissue to the ventricles.
+Status check_tumour(const TetMesh& mesh, const std::vector<char>& taken,
+                    const TriangleSurface& tumour, const std::string& what) {
+  if (!geometry::is_closed(tumour)) return {};
+  const auto index = geometry::ClosestPointIndex::build(tumour);
+  if (!index) return tl::unexpected(index.error());
+  double all_mm3 = 0.0, lost_mm3 = 0.0;
+  for (int t = 0; t < mesh.num_tets(); ++t) {
+    Vec3 centre = Vec3::Zero();
+    for (int k = 0; k < 4; ++k) centre += 0.25 * mesh.nodes.col(mesh.tets(k, t));
+    if (!index->contains(centre)) continue;
+    const double volume_mm3 = geometry::tet_volume(mesh, t);
+    all_mm3 += volume_mm3;
+    lost_mm3 += taken[at(t)] ? volume_mm3 : 0.0;
+  }
+  if (lost_mm3 <= kLargestLostTumour * all_mm3) return {};
+  return invalid(
+      fmt::format("{}: {:.0f} % of the tumour stand in ventricles without touching tissue of the "
+                  "mesh (anatomy.ventricles: off takes ventricles for tissue)",
+                  what, 100.0 * lost_mm3 / all_mm3));
 }
 
 using Edge = std::pair<int, int>;
@@ -174,6 +220,53 @@ std::array<geometry::Facets, 2> parted_facets(const TetMesh& mesh, const Regions
   return facets;
 }
 
+// Leaves out the facets about tissue that they would part from the brain: of less than
+// kSmallestPiece_mm3 together with all that stays joined to it.
+void join_pieces(const TetMesh& mesh, const std::vector<char>& taken, geometry::Facets& facets,
+                 std::vector<int>& septum_of, const std::string& what, Notes* notes) {
+  std::vector<int> parent(at(mesh.num_tets()));
+  std::iota(parent.begin(), parent.end(), 0);
+  const auto root = [&parent](int t) {
+    while (parent[at(t)] != t) t = parent[at(t)] = parent[at(parent[at(t)])];
+    return t;
+  };
+  const std::set<Facet> slit(facets.begin(), facets.end());
+  std::map<Facet, std::pair<int, int>> sides;
+  const std::vector<geometry::MeshFace> faces = geometry::sorted_faces(mesh.tets);
+  for (std::size_t f = 0; f + 1 < faces.size(); ++f) {
+    if (faces[f].nodes != faces[f + 1].nodes) continue;
+    const int a = faces[f].tet, b = faces[f + 1].tet;
+    if (taken[at(a)] || taken[at(b)]) continue;
+    if (slit.count(faces[f].nodes) != 0) {
+      sides[faces[f].nodes] = {a, b};
+    } else {
+      parent[at(root(a))] = root(b);
+    }
+  }
+  std::map<int, double> volumes;
+  for (int t = 0; t < mesh.num_tets(); ++t) {
+    if (!taken[at(t)]) volumes[root(t)] += geometry::tet_volume(mesh, t);
+  }
+  geometry::Facets kept;
+  std::vector<int> kept_septa;
+  for (std::size_t i = 0; i < facets.size(); ++i) {
+    const auto [a, b] = sides.at(facets[i]);
+    const bool parts =
+        root(a) != root(b) && std::min(volumes[root(a)], volumes[root(b)]) < kSmallestPiece_mm3;
+    if (parts) continue;
+    kept.push_back(facets[i]);
+    kept_septa.push_back(septum_of[i]);
+  }
+  if (kept.size() < facets.size()) {
+    add_note(notes,
+             fmt::format("{}: {} facets of falx and tentorium would part tissue of less than "
+                         "{:g} cc from the brain; they are left out",
+                         what, facets.size() - kept.size(), kSmallestPiece_mm3 / 1e3));
+  }
+  facets.swap(kept);
+  septum_of.swap(kept_septa);
+}
+
 // Labels of values/brain_model.hpp.
 void name_tissues(TetMesh& mesh, const Regions& regions, bool tissues) {
   if (!tissues) return mesh.labels.clear();
@@ -197,7 +290,13 @@ Result<geometry::SlitMesh> with_septa_and_ventricles(const TetMesh& mesh, const 
                                                      const TriangleSurface& tumour,
                                                      const std::string& what, Notes* notes) {
   std::vector<char> taken(at(mesh.num_tets()), 0);
-  if (wanted.ventricles) taken = cavities(mesh, what, notes);
+  if (wanted.ventricles) {
+    taken = cavities(mesh, what, notes);
+    take_islands(mesh, taken, what, notes);
+    if (Status kept = check_tumour(mesh, taken, tumour, what); !kept) {
+      return tl::unexpected(kept.error());
+    }
+  }
   geometry::Facets facets;
   std::vector<int> septum_of;
   if (wanted.septa) {
@@ -217,6 +316,7 @@ Result<geometry::SlitMesh> with_septa_and_ventricles(const TetMesh& mesh, const 
       facets.insert(facets.end(), kept.begin(), kept.end());
       septum_of.resize(facets.size(), static_cast<int>(s));
     }
+    join_pieces(mesh, taken, facets, septum_of, what, notes);
     if (facets.empty()) {
       return fail(
           ErrorCode::kEmptySet,

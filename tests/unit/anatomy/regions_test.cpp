@@ -206,6 +206,49 @@ TEST(Regions, MapsThatCannotGiveWhatIsAskedForAreNamed) {
   EXPECT_THAT(refusal(ready), HasSubstr("anatomy.labels: needs a mesh that is generated"));
 }
 
+VoxelImage moved(VoxelImage map, const Vec3& by) {
+  map.T_ras_voxel.pretranslate(by);
+  return map;
+}
+
+TEST(Regions, MapsOfAnotherHeadOrPlaceAreRefused) {
+  CaseInputs elsewhere = labelled_case();
+  elsewhere.labels = moved(*elsewhere.labels, Vec3(0, 0, 12));
+  EXPECT_THAT(refusal(elsewhere),
+              ::testing::AllOf(HasSubstr("anatomy.labels = 'labels.nii': "),
+                               HasSubstr("% of its brain lie more than 3 mm outside the mask of "
+                                         "images.brain = 'ball.nii': must be at most 4 %")));
+  CaseInputs half = labelled_case();
+  std::size_t v = 0;
+  for (int k = 0; k < half.labels->dims[2]; ++k)
+    for (int j = 0; j < half.labels->dims[1]; ++j)
+      for (int i = 0; i < half.labels->dims[0]; ++i, ++v) {
+        const Vec3 x = half.labels->T_ras_voxel * Vec3(i, j, k) - kBallCentre;
+        if (x[1] > 0.0) half.labels->values[v] = 0.0F;
+      }
+  EXPECT_THAT(refusal(half), HasSubstr("lie more than 20 mm from any label of the brain"));
+}
+
+double tissue_within(const BrainModel& model, const Vec3& centre, double radius_mm) {
+  double volume_mm3 = 0.0;
+  for (int t = 0; t < model.mesh.num_tets(); ++t) {
+    const bool within = (centre_of(model.mesh, t) - centre).norm() < radius_mm;
+    volume_mm3 += within ? geometry::tet_volume(model.mesh, t) : 0.0;
+  }
+  return volume_mm3;
+}
+
+TEST(Regions, ATumourThatReachesIntoAVentricleKeepsItsTissue) {
+  CaseInputs inputs = labelled_case();
+  const Vec3 middle(10, 0, 0);
+  inputs.config.tumour = TumourEllipsoid{kBallCentre + middle, Vec3::Constant(9.0)};
+  const LabelledHead head = head_of(inputs);
+  EXPECT_GT(tissue_within(head.model, middle, 9.0), 0.8 * geometry::balls::ball_volume(9.0));
+  EXPECT_THAT(head.notes, ::testing::Contains(HasSubstr("of the tumour lie in ventricles")));
+  inputs.config.tumour = TumourEllipsoid{kBallCentre, Vec3::Constant(4.0)};
+  EXPECT_THAT(refusal(inputs), HasSubstr("% of the tumour stand in ventricles without touching"));
+}
+
 // Both hemispheres of white matter alone: tissue joins them everywhere.
 TEST(Regions, WhereTissueJoinsTheSidesEverywhereThereIsNoSeptum) {
   CaseInputs inputs = labelled_case({{24, 2}, {8, 16}, {47, 16}});
