@@ -131,6 +131,11 @@ std::vector<std::string> fiducial_lines(const FiducialReport& report,
         "than one across it; touch another one beside the line",
         1.0 / report.thinness));
   }
+  if (report.fre_mm > registration::kPoorFre_mm) {
+    lines.push_back(fmt::format(
+        "note: a registration error above {:g} mm rms is poor: touch the fiducials once more",
+        registration::kPoorFre_mm));
+  }
   if (report.count == 3) {
     lines.emplace_back(
         "note: three fiducials leave little to estimate these errors from; touch more");

@@ -75,8 +75,8 @@ struct FiducialReport {
 FiducialReport describe(const registration::FiducialRegistration& fit, bool matched,
                         const Vec3& target);
 
-// Lines for a terminal: the errors, and a note where the fiducials lie nearly on a line or are only
-// three. `names`: of the fiducials, or empty. `target`: "the tumour".
+// Lines for a terminal: the errors, and a note where the fiducials lie nearly on a line, fit poorly
+// or are only three. `names`: of the fiducials, or empty. `target`: "the tumour".
 std::vector<std::string> fiducial_lines(const FiducialReport& report,
                                         const std::vector<std::string>& names,
                                         const std::string& target);
