@@ -204,6 +204,9 @@ Result<RegisterReport> register_patient(const RegisterOptions& options, const Pr
   if (!fit) return tl::unexpected(fit.error());
   const auto target = target_of(options, progress, report);
   if (!target) return tl::unexpected(target.error());
+  const Status reached = check_reach(*target, (options.target ? "--target " : "") + report.target,
+                                     fit->fit.image.rowwise().mean(), "the fiducials in the image");
+  if (!reached) return tl::unexpected(reached.error());
   report.fiducials = describe(fit->fit, fit->matched, *target);
   report.T_ras_reference = fit->fit.T_image_measured;
   const VecX& residuals = fit->fit.residuals_mm;

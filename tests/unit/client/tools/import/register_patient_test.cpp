@@ -264,6 +264,13 @@ TEST_F(RegisterPatient, APoorFitIsWarnedOf) {
               Contains(HasSubstr("note: a registration error above 5 mm rms is poor")));
 }
 
+TEST_F(RegisterPatient, ATargetOutsideOfTheHeadIsRefused) {
+  options.target = Vec3(46, -47, 900);
+  EXPECT_THAT(refusal(), AllOf(HasSubstr("--target (46.0, -47.0, 900.0) lies "),
+                               HasSubstr("from the middle of the fiducials in the image"),
+                               HasSubstr("must lie within 300 mm")));
+}
+
 TEST_F(RegisterPatient, PosesThatTheTrackerLostAreLeftOut) {
   SequenceContent content = stylus.content();
   for (std::size_t i = 20; i < 25; ++i)

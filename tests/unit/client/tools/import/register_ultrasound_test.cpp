@@ -236,6 +236,8 @@ TEST_F(RegisterUltrasound, NamesWhatIsMissingOrWrong) {
                              RigidTransform(Eigen::Translation3d(300, 0, 0)) * kTruth));
   EXPECT_THAT(with([&](O& o) { o.registration = far; }),
               HasSubstr("us.mha: image registration: 0 % of the samples lie inside the MRI"));
+  EXPECT_THAT(with([](O& o) { o.target = Vec3(6, -4, 500); }),
+              HasSubstr("--target (6.0, -4.0, 500.0) lies 500 mm from the middle of the brain in"));
   SequenceContent content = VirtualProbe().content();
   for (auto& frame : content.frames) frame["ProbeToTrackerTransformStatus"] = "INVALID";
   record(content);
