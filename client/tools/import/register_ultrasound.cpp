@@ -224,6 +224,14 @@ IntensitySamples placed(const IntensitySamples& samples, const RigidTransform& T
 
 // ---- what is found, and how well ----
 
+// What places the samples and the brain stands behind an error about where they lie.
+Error placed_by(const UltrasoundRegisterOptions& options, Error error) {
+  if (error.code != ErrorCode::kEmptySet) return error;
+  error.message += "; by --registration " + options.registration.string();
+  if (!options.brain.empty()) error.message += " and --brain " + options.brain.string();
+  return error;
+}
+
 // Precondition: the samples lie where T_ras_reference of the report places them.
 Status judge(const registration::ImageRegistrar& registrar, const IntensitySamples& samples,
              const Vec3& target, UltrasoundRegisterReport& report) {
@@ -308,7 +316,7 @@ Result<UltrasoundRegisterReport> register_ultrasound(const UltrasoundRegisterOpt
   const auto registrar = registration::ImageRegistrar::create(images->mri, &images->brain);
   if (!registrar) return io::file_error(options.mri, registrar.error());
   const auto found = registrar->align(placed(*samples, *T_first));
-  if (!found) return io::file_error(options.ultrasound, found.error());
+  if (!found) return io::file_error(options.ultrasound, placed_by(options, found.error()));
   report.found = *found;
   report.T_ras_reference = found->T_ras_ras * *T_first;
   report.moved_mm = (found->T_ras_ras * images->target - images->target).norm();
