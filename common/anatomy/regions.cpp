@@ -136,12 +136,7 @@ Status check_sides(const VoxelImage& map, const std::string& what) {
 Status check_map(const VoxelImage& map, const AnatomyConfig& wanted, const std::string& what,
                  Notes* notes) {
   std::set<int> labels;
-  for (const float v : map.values) {
-    if (std::isfinite(v) && v != std::round(v)) {
-      return invalid(fmt::format("{}: is no label map: it has the value {:g}", what, v));
-    }
-    labels.insert(whole(v));
-  }
+  for (const float v : map.values) labels.insert(whole(v));
   const auto has = [&](auto&& is) { return std::any_of(labels.begin(), labels.end(), is); };
   const auto structure = [](Structure one) {
     return [one](int label) { return structure_of(label) == one; };
@@ -194,6 +189,8 @@ Result<Regions> Regions::build(const CaseConfig& config, const VoxelImage& label
                                const std::map<int, std::string>& names, double smoothing_mm,
                                const std::string& what, Notes* notes) {
   const AnatomyConfig& wanted = config.anatomy;
+  // Before numbers are changed, which rounds them.
+  if (Status good = check_label_map(labels, what); !good) return tl::unexpected(good.error());
   if (wanted.numbers == LabelNumbers::kAal) {
     return build_from(wanted, with_freesurfer_numbers_of_aal(labels), smoothing_mm, what, notes);
   }

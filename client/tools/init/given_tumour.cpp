@@ -23,9 +23,6 @@
 namespace brainshift::client {
 namespace {
 
-// Numbers of labels are far below; what single precision counts to.
-constexpr float kLargestLabel = 16777216.0F;
-
 std::set<int> labels_in(const VoxelImage& image) {
   std::set<int> labels;
   for (const float v : image.values) {
@@ -235,7 +232,7 @@ Result<GivenTumour> read_tumour(const TumourFile& given, const VoxelImage& grid,
   auto map = io::read_label_map(given.file, {given.segment, 1});
   if (!map) return tl::unexpected(map.error());
   for (const float v : map->values) {
-    if (std::isfinite(v) && std::abs(v) >= kLargestLabel) {
+    if (std::isfinite(v) && std::abs(v) >= anatomy::kLargestLabel) {
       return invalid(
           fmt::format("{}: is no label map: it has the value {:g}", given.file.string(), v));
     }

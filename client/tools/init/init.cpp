@@ -174,6 +174,9 @@ fs::path beside(const fs::path& out, const std::string& what) {
 Result<VoxelImage> read_labels(const fs::path& path) {
   auto map = io::read_volume(path);
   if (!map) return map;
+  if (Status good = anatomy::check_label_map(*map, "--labels: " + path.string()); !good) {
+    return tl::unexpected(good.error());
+  }
   const auto names = io::label_names_beside(path);
   if (!names) return tl::unexpected(names.error());
   if (names->empty()) return map;

@@ -167,6 +167,16 @@ TEST_F(FirstCase, ATumourWithinAnotherThatIsChosenIsOfTheWhole) {
   EXPECT_THAT(std::get<TumourLabel>(config.tumour).labels, ElementsAre(2));
 }
 
+TEST_F(FirstCase, LabelsThatAreNoWholeNumbersAreRefused) {
+  VoxelImage labels = drawn(label_at);
+  labels.values[labels.values.size() / 2] = 41.4F;
+  put("labels.nii", labels);
+  const std::string no_map = "labels.nii: is no label map: it has the value 41.4, no whole number";
+  EXPECT_THAT(refusal(), AllOf(HasSubstr("--labels: "), HasSubstr(no_map)));
+  folder.write("labels.tsv", "index\tname\n41\tRight-Cerebral-White-Matter\n16\tBrain-Stem\n");
+  EXPECT_THAT(refusal(), HasSubstr(no_map));
+}
+
 TEST_F(FirstCase, LabelsOfAnotherNumberingAreRefusedByFile) {
   options.labels = options.tumour;
   EXPECT_THAT(refusal(), AllOf(HasSubstr("tumour.nii"), HasSubstr("FreeSurfer's numbers")));
