@@ -177,6 +177,16 @@ TEST_F(FirstCase, LabelsThatAreNoWholeNumbersAreRefused) {
   EXPECT_THAT(refusal(), HasSubstr(no_map));
 }
 
+TEST_F(FirstCase, ATumourIsNamedByTheOptionThatIsForItsFile) {
+  options.tumour_label = "1", options.tumour_segment = "Mass";
+  EXPECT_THAT(refusal(), HasSubstr("--tumour-label \"1\" and --tumour-segment \"Mass\": give one"));
+  options.tumour_label.clear();
+  EXPECT_THAT(refusal(), HasSubstr("only a .seg.nrrd file does"));
+  options.tumour = folder.write("seg.dcm", io::Segmentation().set(1, 4).set(2, 4).bytes());
+  EXPECT_THAT(refusal(), AllOf(HasSubstr("--tumour-segment: \"Mass\": is for a .seg.nrrd"),
+                               HasSubstr("seg.dcm is DICOM")));
+}
+
 TEST_F(FirstCase, LabelsOfAnotherNumberingAreRefusedByFile) {
   options.labels = options.tumour;
   EXPECT_THAT(refusal(), AllOf(HasSubstr("tumour.nii"), HasSubstr("FreeSurfer's numbers")));
