@@ -29,22 +29,6 @@ std::string yaml_list(const std::vector<double>& values) {
   return fmt::format("[{:.17g}]", fmt::join(values, ", "));
 }
 
-// Double-quoted YAML: only these need an escape in printable text; control characters by number.
-std::string quoted(const std::string& value) {
-  std::string out = "\"";
-  for (const char c : value) {
-    if (c == '"' || c == '\\') {
-      out += '\\';
-      out += c;
-    } else if (static_cast<unsigned char>(c) < 0x20) {
-      out += fmt::format("\\x{:02x}", static_cast<unsigned>(c));
-    } else {
-      out += c;
-    }
-  }
-  return out + "\"";
-}
-
 // Visitor of a key table (configuration/key_table.hpp) that writes every key with its value as
 // YAML: absolute paths, numbers with 17 significant digits, which give every double back.
 class KeyWriter : public KeyWalker<KeyWriter> {
@@ -65,10 +49,10 @@ class KeyWriter : public KeyWalker<KeyWriter> {
                                 : fmt::format("[{}]", fmt::join(value, ", ")));
   }
   void operator()(const Key& key, const std::string& value, Need = Need::kOptional) {
-    line(key, quoted(value));
+    line(key, yaml_text(value));
   }
   void operator()(const Key& key, const fs::path& value, Need = Need::kOptional) {
-    line(key, quoted(value.empty() ? "" : fs::absolute(value).lexically_normal().string()));
+    line(key, yaml_text(value.empty() ? "" : fs::absolute(value).lexically_normal().string()));
   }
   template <typename T>
   void operator()(const Key& key, const std::optional<T>& value) {
@@ -76,7 +60,7 @@ class KeyWriter : public KeyWalker<KeyWriter> {
   }
   template <typename T, typename W, std::size_t N>
   void operator()(const Key& key, const T& value, const Word<W> (&words)[N]) {
-    line(key, quoted(word_of(value, words)));
+    line(key, yaml_text(word_of(value, words)));
   }
   void open(const Key& key) { line(key, ""); }
 
@@ -122,6 +106,22 @@ class Loader {
 };
 
 }  // namespace
+
+// Only these need an escape in printable text; control characters by number.
+std::string yaml_text(const std::string& value) {
+  std::string out = "\"";
+  for (const char c : value) {
+    if (c == '"' || c == '\\') {
+      out += '\\';
+      out += c;
+    } else if (static_cast<unsigned char>(c) < 0x20) {
+      out += fmt::format("\\x{:02x}", static_cast<unsigned>(c));
+    } else {
+      out += c;
+    }
+  }
+  return out + "\"";
+}
 
 Result<CaseConfig> parse_case_config(const std::string& text, const fs::path& file) {
   const auto read = [](YamlSection& root, CaseConfig& config) {

@@ -22,9 +22,13 @@ Result<CaseConfig> read_case_config(const std::filesystem::path& path);
 // exist.
 Result<CaseConfig> parse_case_config(const std::string& text, const std::filesystem::path& file);
 
-// The case as the text of a case file with every key, absolute paths and numbers with all their
-// digits. parse_case_config(case_config_text(c), c.file) gives c again, bit for bit, when c is
-// valid and its two directions have length 1 up to rounding.
+// A text in double quotes, as YAML reads it back where it is UTF-8.
+std::string yaml_text(const std::string& value);
+
+// The case as the text of a case file with every key that does something, absolute paths and
+// numbers with all their digits. parse_case_config(case_config_text(c), c.file) gives c again, bit
+// for bit, when c is valid and its two directions have length 1 up to rounding; what does nothing
+// has its default.
 std::string case_config_text(const CaseConfig& config);
 
 // Reads the files that a case names. The MRI, which only pictures need, is just looked up.
