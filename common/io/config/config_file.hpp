@@ -15,11 +15,12 @@ namespace brainshift::io {
 
 // Reads and validates a case file (config/cases/colin27.yaml documents every key). Relative paths
 // are taken from the case file's folder. The direction of gravity and the craniotomy's axis are
-// normalised. Whether the files that it names exist is for load_case_inputs to say.
+// normalised. A section of kNeedLabels without anatomy.labels would do nothing and is refused.
+// Whether the files that it names exist is for load_case_inputs to say.
 Result<CaseConfig> read_case_config(const std::filesystem::path& path);
 
 // The same from text. `file` is what messages name and relative paths start from; it need not
-// exist.
+// exist. Sections that do nothing are taken: models of earlier versions have them in their text.
 Result<CaseConfig> parse_case_config(const std::string& text, const std::filesystem::path& file);
 
 // A text in double quotes, as YAML reads it back where it is UTF-8.
