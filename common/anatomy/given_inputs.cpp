@@ -168,6 +168,16 @@ VoxelImage without_sulci(VoxelImage mask, const std::string& what, Notes* notes)
   return std::move(*filled);
 }
 
+Status check_label_map(const VoxelImage& map, const std::string& what) {
+  for (const float v : map.values) {
+    if (!std::isfinite(v) || (is_whole(v) && std::abs(v) < kLargestLabel)) continue;
+    return invalid(fmt::format(
+        "{}: is no label map: it has the value {:g}{}", what, v,
+        is_whole(v) ? "" : ", no whole number; resample the labels by nearest neighbour"));
+  }
+  return {};
+}
+
 std::string listed_labels(const VoxelImage& image) {
   constexpr std::size_t kMost = 20;
   std::map<long, std::size_t> counts;

@@ -54,6 +54,11 @@ inline constexpr double kSmallestFocus_mm3 = 50.0;
 Result<std::vector<Focus>> tumour_foci(const VoxelImage& image, const std::vector<int>& labels,
                                        double margin_mm, const std::string& what, Notes* notes);
 
+// Numbers of labels are far below; what single precision counts to.
+inline constexpr float kLargestLabel = 16777216.0F;
+// kInvalidArgument: a value that is no whole number, or far above any label; the sentence has it.
+Status check_label_map(const VoxelImage& map, const std::string& what);
+
 // "1 (2.10 cc), 4 (0.31 cc)": the labels of an image but 0, with their volumes; at most 20 of
 // them.
 std::string listed_labels(const VoxelImage& image);

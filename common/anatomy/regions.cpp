@@ -138,12 +138,7 @@ Status check_sides(const VoxelImage& map, const std::string& what) {
 Status check_map(const VoxelImage& map, const AnatomyConfig& wanted, const std::string& what,
                  Notes* notes) {
   std::set<int> labels;
-  for (const float v : map.values) {
-    if (std::isfinite(v) && v != std::round(v)) {
-      return invalid(fmt::format("{}: is no label map: it has the value {:g}", what, v));
-    }
-    labels.insert(whole(v));
-  }
+  for (const float v : map.values) labels.insert(whole(v));
   const auto has = [&](auto&& is) { return std::any_of(labels.begin(), labels.end(), is); };
   const auto structure = [](Structure one) {
     return [one](int label) { return structure_of(label) == one; };
@@ -310,6 +305,8 @@ Status keep_tumour(std::vector<std::uint8_t>& regions, const VoxelImage& map,
 Result<Regions> Regions::build(const CaseInputs& inputs, const TriangleSurface& tumour,
                                double smoothing_mm, const std::string& what, Notes* notes) {
   const VoxelImage& labels = *inputs.labels;
+  // Before numbers are changed, which rounds them.
+  if (Status good = check_label_map(labels, what); !good) return tl::unexpected(good.error());
   if (inputs.config.anatomy.numbers == LabelNumbers::kAal) {
     return build_from(inputs, with_freesurfer_numbers_of_aal(labels), tumour, smoothing_mm, what,
                       notes);

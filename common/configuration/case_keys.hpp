@@ -465,6 +465,9 @@ void visit(A& a, V& v) {
     v.pressure_step_s, between(1e-6, 1e9));
 }
 
+// Sections that do nothing without anatomy.labels.
+inline constexpr const char* kNeedLabels[] = {"anatomy", "material.tissues"};
+
 template <typename A, Of<CaseConfig> V>
 void visit(A& a, V& v) {
   const auto section = [&a](const Key& key, Need need, auto& value) {

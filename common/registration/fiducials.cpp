@@ -10,6 +10,8 @@
 #include <utility>
 
 #include "common/core/small_matrices.hpp"
+#include "common/core/text.hpp"
+#include "common/geometry/misplacement.hpp"
 
 namespace brainshift::registration {
 namespace {
@@ -22,6 +24,10 @@ constexpr double kSamePlace = 1e-3;
 // The largest ratio between the extents (largest distance between two points) of one arrangement
 // that is measured twice.
 constexpr double kExtentRatio = 1.5;
+// A mistake explains an error from here on that is four times as small without it. Fewer than four
+// fiducials fit too many ways.
+constexpr double kExplainable_mm = 2.0, kExplained = 0.25;
+constexpr Eigen::Index kTold = 4;
 
 double extent_mm(const Points& points) {
   double extent = 0.0;
@@ -69,6 +75,17 @@ Status check_extents(double measured_mm, double image_mm) {
                              measured_mm, image_mm, guess));
 }
 
+Status check_span(const Points& image) {
+  const auto fits = [](const Points& points) {
+    const double span = extent_mm(points);
+    return span >= kSmallestSpan_mm && span <= kLargestSpan_mm;
+  };
+  if (fits(image)) return {};
+  return invalid(fmt::format("fiducials: the image's span {:.3g} mm: must span {:g} to {:g} mm{}",
+                             extent_mm(image), kSmallestSpan_mm, kLargestSpan_mm,
+                             geometry::likely_mistake(image, fits)));
+}
+
 RigidTransform least_squares(const Points& measured, const Points& image) {
   const Vec3 from = measured.rowwise().mean(), to = image.rowwise().mean();
   const Mat3 covariance = (image.colwise() - to) * (measured.colwise() - from).transpose();
@@ -94,6 +111,41 @@ FiducialRegistration fit(const Points& measured, const Points& image) {
   for (int i = 0; i < measured.cols(); ++i) result.of_image.push_back(i);
   result.image = image;
   return result;
+}
+
+// "\"left ear\" and \"right ear\"", or "fiducials 2 and 3".
+std::string pair_called(const std::vector<std::string>& names, Eigen::Index i, Eigen::Index j) {
+  const auto one = static_cast<std::size_t>(i), other = static_cast<std::size_t>(j);
+  const bool named =
+      std::max(one, other) < names.size() && !names[one].empty() && !names[other].empty();
+  return named ? in_quotes(names[one]) + " and " + in_quotes(names[other])
+               : fmt::format("fiducials {} and {}", i + 1, j + 1);
+}
+
+// The end of a sentence: two fiducials of the image exchanged, those that fit best, or left and
+// right. "" where neither explains the error.
+std::string what_explains(const Points& measured, const FiducialRegistration& found,
+                          const std::vector<std::string>& names) {
+  const double most = std::min(kPoorFre_mm, kExplained * found.fre_mm);
+  const auto explains = [most](double fre_mm) { return fre_mm <= most; };
+  std::string exchanged;
+  double least = found.fre_mm;
+  Points image = found.image;
+  for (Eigen::Index i = 0; i < image.cols(); ++i) {
+    for (Eigen::Index j = 0; j < i; ++j) {
+      image.col(i).swap(image.col(j));
+      const double fre_mm = fit(measured, image).fre_mm;
+      image.col(i).swap(image.col(j));
+      if (!explains(fre_mm) || fre_mm >= least) continue;
+      least = fre_mm;
+      exchanged = fmt::format("; {} exchanged?", pair_called(names, j, i));
+    }
+  }
+  // A rotation or a scale changes nothing here: of these mistakes only a mirror image can fit.
+  const std::string mirrored = geometry::likely_mistake(
+      image, [&](const Points& meant) { return explains(fit(measured, meant).fre_mm); });
+  if (exchanged.empty() || mirrored.empty()) return exchanged + mirrored;
+  return exchanged + " or" + mirrored.substr(1);
 }
 
 // Depth-first over assignments. A branch ends where a distance to a fiducial that is already
@@ -165,7 +217,8 @@ Status check_match(const Points& measured, const Points& image, const MatchOptio
                     "measured than in the image",
                     measured.cols(), image.cols()));
   if (Status good = check_set("measured", measured); !good) return good;
-  return check_set("image", image);
+  Status good = check_set("image", image);
+  return good ? check_span(image) : good;
 }
 
 }  // namespace
@@ -193,11 +246,17 @@ Result<FiducialRegistration> match_fiducials(const Points& measured, const Point
     return tl::unexpected(check_extents(here, there).error());
   Matcher matcher(measured, image, options.tolerance_mm);
   matcher.search();
-  if (!matcher.best())
+  if (!matcher.best()) {
+    const std::string mistake = geometry::likely_mistake(image, [&](const Points& meant) {
+      Matcher other(measured, meant, options.tolerance_mm);
+      other.search();
+      return other.best().has_value();
+    });
     return fail(ErrorCode::kNotConverged,
                 fmt::format("fiducials: no correspondence of {} measured to {} in the image keeps "
-                            "all distances within {} mm",
-                            measured.cols(), image.cols(), options.tolerance_mm));
+                            "all distances within {} mm{}",
+                            measured.cols(), image.cols(), options.tolerance_mm, mistake));
+  }
   const double best = matcher.best()->fre_mm, second = matcher.second_fre_mm();
   if (second < options.ambiguity_factor * best || second < best + options.ambiguity_mm)
     return invalid(
@@ -205,6 +264,26 @@ Result<FiducialRegistration> match_fiducials(const Points& measured, const Point
                     "mm rms): give their order",
                     best, second));
   return *matcher.best();
+}
+
+Status check_head_fit(const Points& measured, const FiducialRegistration& fit,
+                      const std::vector<std::string>& names) {
+  if (Status good = check_span(fit.image); !good) return good;
+  const bool too_large = !(fit.fre_mm <= kLargestFre_mm);
+  const bool told = fit.image.cols() >= kTold && fit.fre_mm > kExplainable_mm;
+  if (!too_large && !told) return {};
+  const std::string mistake = what_explains(measured, fit, names);
+  if (too_large) {
+    return invalid(fmt::format(
+        "fiducials: the best fit leaves {:.1f} mm rms: must leave at most {:g} mm{}", fit.fre_mm,
+        kLargestFre_mm,
+        mistake.empty() ? "; are both lists of this head, mm, and in the same order?" : mistake));
+  }
+  if (mistake.empty()) return {};
+  return invalid(
+      fmt::format("fiducials: the best fit leaves {:.1f} mm rms, and less than {:.1f} "
+                  "mm without a mistake{}",
+                  fit.fre_mm, kExplained * fit.fre_mm, mistake));
 }
 
 double thinness(const Points& points) {

@@ -15,6 +15,7 @@
 // nothing.
 #pragma once
 
+#include <string>
 #include <vector>
 
 #include "common/core/error.hpp"
@@ -54,9 +55,24 @@ struct MatchOptions {
 // image.
 // The errors of register_fiducials; kNotConverged when none fits ("no correspondence ...");
 // kInvalidArgument when two fit nearly alike (mirror-like or regular arrangements), with both
-// residuals.
+// residuals, and when the image's fiducials span no head.
 Result<FiducialRegistration> match_fiducials(const Points& measured, const Points& image,
                                              const MatchOptions& options = {});
+
+// What fiducials on a head span, and what a registration of a head leaves. A pointer on skin or on
+// an anatomical landmark misses by 2 to 5 mm, so more than 5 mm rms is poor, and more than 10 mm
+// comes from lists that do not belong together.
+inline constexpr double kSmallestSpan_mm = 30.0, kLargestSpan_mm = 500.0;
+inline constexpr double kPoorFre_mm = 5.0, kLargestFre_mm = 10.0;
+
+// Whether a fit can be the registration of a head. measured: as it was fitted; names: of the
+// fiducials, or empty.
+// kInvalidArgument: the fiducials span less or more than above; the FRE is above kLargestFre_mm; or
+// it is above 2 mm, and at least four fiducials fit four times as well as a mirror image, or with
+// two of them exchanged. The sentence names the mistake that explains it: the unit, left and right,
+// the two fiducials.
+Status check_head_fit(const Points& measured, const FiducialRegistration& fit,
+                      const std::vector<std::string>& names = {});
 
 // How far the points are from lying on one line: their rms extent along the second principal axis
 // over that along the first. 1: as wide as long; 0: on a line.

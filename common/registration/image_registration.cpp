@@ -206,17 +206,26 @@ class Level {
     std::optional<GradientInterpolator> counts;
     if (region) counts.emplace(*region);
     std::vector<double> seen;
-    int asked = 0;
-    for (int i = 0; i < count; i += stride, ++asked)
-      if (const ImageValue value = interpolator(task.samples.positions.col(i));
-          value.inside && (!counts || (*counts)(task.samples.positions.col(i)).value > 0.5))
+    int asked = 0, inside = 0;
+    for (int i = 0; i < count; i += stride, ++asked) {
+      const ImageValue value = interpolator(task.samples.positions.col(i));
+      if (!value.inside) continue;
+      ++inside;
+      if (!counts || (*counts)(task.samples.positions.col(i)).value > 0.5) {
         seen.push_back(value.value);
+      }
+    }
     const double overlap = static_cast<double>(seen.size()) / asked;
-    if (overlap < task.options.min_overlap)
-      return fail(ErrorCode::kEmptySet,
-                  fmt::format("image registration: {:.0f} % of the samples lie inside the MRI: at "
-                              "least {:.0f} % needed",
-                              100.0 * overlap, 100.0 * task.options.min_overlap));
+    if (overlap < task.options.min_overlap) {
+      const double in_image = static_cast<double>(inside) / asked;
+      const bool of_region = in_image >= task.options.min_overlap;
+      return fail(
+          ErrorCode::kEmptySet,
+          fmt::format("image registration: {:.0f} % of the samples lie inside {}: at "
+                      "least {:.0f} % needed",
+                      100.0 * (of_region ? overlap : in_image), of_region ? "the brain" : "the MRI",
+                      100.0 * task.options.min_overlap));
+    }
     const BinScale scale =
         quantile_scale(Eigen::Map<const VecX>(seen.data(), static_cast<Eigen::Index>(seen.size())),
                        task.options.low_quantile, task.options.high_quantile, task.options.bins);

@@ -125,8 +125,9 @@ class ImageRegistrar {
   // samples: places in mm RAS as the fiducials register them, intensities of any unit.
   // kInvalidArgument: fewer than 500 samples; numbers of positions and intensities that differ;
   // all samples at one place; equal intensities (of all samples, or of the MRI at all of them).
-  // kNotFinite: names the sample. kEmptySet: too few samples inside the MRI. kNotConverged: the
-  // best pose lies at the edge of the search.
+  // kNotFinite: names the sample. kEmptySet: too few samples inside the MRI, or inside the region,
+  // which the sentence calls the brain. kNotConverged: the best pose lies at the edge of the
+  // search.
   Result<ImageRegistration> align(const IntensitySamples& samples) const;
   // From the given pose alone, on the finest level: where a pose is nearly known. Errors as above.
   Result<ImageRegistration> refine(const IntensitySamples& samples) const;

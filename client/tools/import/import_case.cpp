@@ -102,6 +102,16 @@ std::string error_place(const std::optional<Vec3>& target) {
   return fmt::format("({:.1f}, {:.1f}, {:.1f})", target->x(), target->y(), target->z());
 }
 
+Status check_reach(const Vec3& target, const std::string& name, const Vec3& middle,
+                   const std::string& of) {
+  const double away = (target - middle).norm();
+  if (away <= kLargestReach_mm) return {};
+  return invalid(fmt::format(
+      "{} lies {:.0f} mm from the middle of {}, ({:.1f}, {:.1f}, {:.1f}): must lie within {:g} mm; "
+      "is it mm RAS, and of this head?",
+      name, away, of, middle.x(), middle.y(), middle.z(), kLargestReach_mm));
+}
+
 FiducialReport describe(const registration::FiducialRegistration& fit, bool matched,
                         const Vec3& target) {
   FiducialReport report;
@@ -130,6 +140,11 @@ std::vector<std::string> fiducial_lines(const FiducialReport& report,
         "note: the fiducials lie nearly on a line: a rotation about it is known {:.0f} times worse "
         "than one across it; touch another one beside the line",
         1.0 / report.thinness));
+  }
+  if (report.fre_mm > registration::kPoorFre_mm) {
+    lines.push_back(fmt::format(
+        "note: a registration error above {:g} mm rms is poor: touch the fiducials once more",
+        registration::kPoorFre_mm));
   }
   if (report.count == 3) {
     lines.emplace_back(

@@ -62,6 +62,13 @@ Status check_error_place(const std::filesystem::path& case_file, const std::file
 // Its name: "the tumour", or the point.
 std::string error_place(const std::optional<Vec3>& target);
 
+// From the middle of a head, or of the fiducials on it, to a place within.
+inline constexpr double kLargestReach_mm = 300.0;
+// kInvalidArgument where a target lies farther from the middle `of` something ("the fiducials in
+// the image"). name: "--target (1.0, 2.0, 3.0)", "the tumour".
+Status check_reach(const Vec3& target, const std::string& name, const Vec3& middle,
+                   const std::string& of);
+
 // What a user should know about a registration by fiducials before relying on it.
 struct FiducialReport {
   int count = 0;
@@ -75,8 +82,8 @@ struct FiducialReport {
 FiducialReport describe(const registration::FiducialRegistration& fit, bool matched,
                         const Vec3& target);
 
-// Lines for a terminal: the errors, and a note where the fiducials lie nearly on a line or are only
-// three. `names`: of the fiducials, or empty. `target`: "the tumour".
+// Lines for a terminal: the errors, and a note where the fiducials lie nearly on a line, fit poorly
+// or are only three. `names`: of the fiducials, or empty. `target`: "the tumour".
 std::vector<std::string> fiducial_lines(const FiducialReport& report,
                                         const std::vector<std::string>& names,
                                         const std::string& target);

@@ -129,7 +129,17 @@ struct Fit {
 
 Result<Fit> fit_pairs(const RegisterOptions& options, const io::NamedPoints& touched,
                       const io::NamedPoints& ras, RegisterReport& report) {
-  const auto failed = [&](const Error& error) { return io::file_error(options.ras, error); };
+  const fs::path& from = options.recording.empty() ? options.fiducials : options.recording;
+  const auto failed = [&](const Error& error) {
+    return fail(error.code, from.string() + " and " + options.ras.string() + ": " + error.message);
+  };
+  const auto checked = [&](const Points& measured,
+                           Result<registration::FiducialRegistration> fit) -> Result<Fit> {
+    if (!fit) return failed(fit.error());
+    const Status head = registration::check_head_fit(measured, *fit, report.names);
+    if (!head) return failed(head.error());
+    return Fit{std::move(*fit), options.pairing == Pairing::kShape};
+  };
   const bool named = touched.all_named() && ras.all_named();
   const bool by_name =
       options.pairing == Pairing::kName || (options.pairing == Pairing::kAuto && named);
@@ -138,10 +148,8 @@ Result<Fit> fit_pairs(const RegisterOptions& options, const io::NamedPoints& tou
     if (!pairs) return failed(pairs.error());
     report.names = pairs->names;
     report.left_out = pairs->left_out;
-    auto fit =
-        registration::register_fiducials(columns_of(pairs->first), columns_of(pairs->second));
-    if (!fit) return failed(fit.error());
-    return Fit{std::move(*fit), false};
+    const Points first = columns_of(pairs->first);
+    return checked(first, registration::register_fiducials(first, columns_of(pairs->second)));
   }
   const Points measured = columns_of(touched.points), image = columns_of(ras.points);
   if (options.pairing == Pairing::kShape) {
@@ -150,7 +158,7 @@ Result<Fit> fit_pairs(const RegisterOptions& options, const io::NamedPoints& tou
     for (const int i : fit->of_image) {
       report.names.push_back(ras.names[static_cast<std::size_t>(i)]);
     }
-    return Fit{std::move(*fit), true};
+    return checked(measured, std::move(fit));
   }
   if (measured.cols() != image.cols()) {
     const std::string held =
@@ -161,10 +169,8 @@ Result<Fit> fit_pairs(const RegisterOptions& options, const io::NamedPoints& tou
         fmt::format("{} fiducials were touched, {} holds {}: in order there must be as many{}",
                     measured.cols(), options.ras.string(), image.cols(), held));
   }
-  auto fit = registration::register_fiducials(measured, image);
-  if (!fit) return failed(fit.error());
   report.names = ras.names;
-  return Fit{std::move(*fit), false};
+  return checked(measured, registration::register_fiducials(measured, image));
 }
 
 Result<Fit> fit_fiducials(const RegisterOptions& options, RegisterReport& report) {
@@ -198,6 +204,9 @@ Result<RegisterReport> register_patient(const RegisterOptions& options, const Pr
   if (!fit) return tl::unexpected(fit.error());
   const auto target = target_of(options, progress, report);
   if (!target) return tl::unexpected(target.error());
+  const Status reached = check_reach(*target, (options.target ? "--target " : "") + report.target,
+                                     fit->fit.image.rowwise().mean(), "the fiducials in the image");
+  if (!reached) return tl::unexpected(reached.error());
   report.fiducials = describe(fit->fit, fit->matched, *target);
   report.T_ras_reference = fit->fit.T_image_measured;
   const VecX& residuals = fit->fit.residuals_mm;

@@ -87,6 +87,21 @@ Result<VoxelImage> given_mask(const fs::path& path, anatomy::Notes& notes) {
   return anatomy::brain_mask(*image, path.string(), &notes);
 }
 
+// Precondition: a voxel is > 0.
+Vec3 middle_of(const VoxelImage& mask) {
+  Vec3 sum = Vec3::Zero();
+  double count = 0.0;
+  std::size_t v = 0;
+  for (int k = 0; k < mask.dims[2]; ++k) {
+    for (int j = 0; j < mask.dims[1]; ++j) {
+      for (int i = 0; i < mask.dims[0]; ++i, ++v) {
+        if (mask.values[v] > 0.0F) sum += Vec3(i, j, k), count += 1.0;
+      }
+    }
+  }
+  return mask.T_ras_voxel * Vec3(sum / count);
+}
+
 Result<PatientImages> read_images(const UltrasoundRegisterOptions& options,
                                   const Progress& progress, anatomy::Notes& notes) {
   PatientImages images;
@@ -100,6 +115,10 @@ Result<PatientImages> read_images(const UltrasoundRegisterOptions& options,
   }
   if (options.target) {
     images.target = *options.target;
+    const Status reached =
+        check_reach(images.target, "--target " + error_place(options.target),
+                    middle_of(images.brain), "the brain in " + options.brain.string());
+    if (!reached) return tl::unexpected(reached.error());
     return images;
   }
   const auto known = load_import_case(options.case_file, options.model, progress);
@@ -205,6 +224,14 @@ IntensitySamples placed(const IntensitySamples& samples, const RigidTransform& T
 
 // ---- what is found, and how well ----
 
+// What places the samples and the brain stands behind an error about where they lie.
+Error placed_by(const UltrasoundRegisterOptions& options, Error error) {
+  if (error.code != ErrorCode::kEmptySet) return error;
+  error.message += "; by --registration " + options.registration.string();
+  if (!options.brain.empty()) error.message += " and --brain " + options.brain.string();
+  return error;
+}
+
 // Precondition: the samples lie where T_ras_reference of the report places them.
 Status judge(const registration::ImageRegistrar& registrar, const IntensitySamples& samples,
              const Vec3& target, UltrasoundRegisterReport& report) {
@@ -289,7 +316,7 @@ Result<UltrasoundRegisterReport> register_ultrasound(const UltrasoundRegisterOpt
   const auto registrar = registration::ImageRegistrar::create(images->mri, &images->brain);
   if (!registrar) return io::file_error(options.mri, registrar.error());
   const auto found = registrar->align(placed(*samples, *T_first));
-  if (!found) return io::file_error(options.ultrasound, found.error());
+  if (!found) return io::file_error(options.ultrasound, placed_by(options, found.error()));
   report.found = *found;
   report.T_ras_reference = found->T_ras_ras * *T_first;
   report.moved_mm = (found->T_ras_ras * images->target - images->target).norm();

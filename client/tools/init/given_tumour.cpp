@@ -23,9 +23,6 @@
 namespace brainshift::client {
 namespace {
 
-// Numbers of labels are far below; what single precision counts to.
-constexpr float kLargestLabel = 16777216.0F;
-
 std::set<int> labels_in(const VoxelImage& image) {
   std::set<int> labels;
   for (const float v : image.values) {
@@ -228,14 +225,28 @@ Result<GivenTumour> from_segments(const TumourFile& given, const MriIdentity& mr
 
 Result<GivenTumour> read_tumour(const TumourFile& given, const VoxelImage& grid,
                                 const MriIdentity& mri) {
-  if (io::is_dicom(given.file)) {
+  const bool dicom = io::is_dicom(given.file);
+  if (dicom && !given.segment.empty()) {
+    return invalid(
+        fmt::format("--tumour-segment: {}: is for a .seg.nrrd; {} is DICOM, whose segments and "
+                    "structures --tumour-label names",
+                    in_quotes(given.segment), given.file.string()));
+  }
+  if (!given.label.empty() && !given.segment.empty()) {
+    return invalid(fmt::format("--tumour-label {} and --tumour-segment {}: give one of them",
+                               in_quotes(given.label), in_quotes(given.segment)));
+  }
+  if (dicom) {
     return io::is_dicom_structures(given.file) ? from_structures(given, grid, mri)
                                                : from_segments(given, mri);
   }
   auto map = io::read_label_map(given.file, {given.segment, 1});
+  if (!map && given.segment.empty() && map.error().code == ErrorCode::kInvalidArgument) {
+    return invalid(map.error().message + " (--tumour-segment)");
+  }
   if (!map) return tl::unexpected(map.error());
   for (const float v : map->values) {
-    if (std::isfinite(v) && std::abs(v) >= kLargestLabel) {
+    if (std::isfinite(v) && std::abs(v) >= anatomy::kLargestLabel) {
       return invalid(
           fmt::format("{}: is no label map: it has the value {:g}", given.file.string(), v));
     }

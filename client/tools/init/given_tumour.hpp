@@ -38,9 +38,9 @@ struct MriIdentity {
 };
 
 // grid: of the MRI. What DICOM drew must lie in the MRI's frame of reference.
-// kInvalidArgument: labels that are not there (those that are, are listed with their volumes),
-// several and none chosen, another frame of reference. Errors of the readers and of
-// io::fill_contours.
+// kInvalidArgument: both label and segment, a segment of DICOM, labels that are not there (those
+// that are, are listed with their volumes), several and none chosen, another frame of reference.
+// Errors of the readers and of io::fill_contours.
 Result<GivenTumour> read_tumour(const TumourFile& given, const VoxelImage& grid,
                                 const MriIdentity& mri);
 

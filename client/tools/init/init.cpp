@@ -10,6 +10,7 @@
 #include <map>
 #include <numbers>
 #include <optional>
+#include <tuple>
 #include <utility>
 
 #include "client/tools/init/given_tumour.hpp"
@@ -89,18 +90,13 @@ std::string list_text(const Vec3& x, int digits) {
   return fmt::format("[{:.{}f}, {:.{}f}, {:.{}f}]", x[0], digits, x[1], digits, x[2], digits);
 }
 
-// In double quotes, as YAML has them.
-std::string file_text(const fs::path& path) {
-  std::string text = "\"";
-  for (const char c : fs::absolute(path).lexically_normal().string()) {
-    if (c == '"' || c == '\\') text += '\\';
-    text += c;
-  }
-  return text + "\"";
-}
+fs::path whole_path(const fs::path& path) { return fs::absolute(path).lexically_normal(); }
 
-// Lines of comment, broken before column 100.
-std::string comment(const std::string& sentence, std::size_t indent) {
+std::string file_text(const fs::path& path) { return io::yaml_text(whole_path(path).string()); }
+
+// Lines of comment, broken before column 100. A file's name in it may hold a line break.
+std::string comment(const std::string& words, std::size_t indent) {
+  const std::string sentence = one_line(words);
   const std::string begin = std::string(indent, ' ') + "#";
   std::string text, line = begin;
   for (std::size_t at = 0; at < sentence.size();) {
@@ -140,12 +136,12 @@ std::string case_text(const Draft& draft) {
       "brainshift preview and correct it. Places are patient RAS in mm: +x right, +y anterior, "
       "+z superior. config/cases/colin27.yaml documents every key.",
       0);
-  text += "case_id: " + draft.options.out.stem().string() + "\n\nimages:\n";
+  text += "case_id: " + io::yaml_text(draft.options.out.stem().string()) + "\n\nimages:\n";
   if (!draft.about_mri.empty()) text += comment(draft.about_mri, 2);
   text += "  mri: " + file_text(draft.mri) + "\n" + comment(draft.about_brain, 2);
   text += "  brain: " + file_text(draft.brain) + "\n\ntumour:\n  label_volume:\n";
   text += comment(draft.about_tumour, 4) + "    file: " + file_text(draft.tumour_file) + "\n";
-  text += segment ? "    segment: \"" + draft.options.tumour_segment + "\"\n"
+  text += segment ? "    segment: " + io::yaml_text(draft.options.tumour_segment) + "\n"
                   : "    label: [" + labels + "]\n";
   text += "\ncraniotomy:\n" + comment(draft.about_opening, 2);
   text += "  centre_mm: " + list_text(draft.opening.centre, 1) + "\n";
@@ -165,6 +161,25 @@ std::string case_text(const Draft& draft) {
   return text + "# anatomy:\n#   labels: " + file_text(draft.options.labels) + "\n";
 }
 
+// Other readers of YAML, and messages that carry a case_id, need UTF-8.
+Status check_names(const Draft& draft, const CaseConfig& read) {
+  const auto& tumour = std::get<TumourLabel>(read.tumour);
+  const std::string case_id = draft.options.out.stem().string();
+  const std::string& segment = draft.options.tumour_segment;
+  const std::tuple<const char*, std::string, bool> names[] = {
+      {"--out", case_id, read.case_id == case_id},
+      {"--mri", draft.mri.string(), read.mri == whole_path(draft.mri)},
+      {"--brain", draft.brain.string(), read.brain == whole_path(draft.brain)},
+      {"--tumour", draft.tumour_file.string(), tumour.path == whole_path(draft.tumour_file)},
+      {"--tumour-segment", segment, tumour.segment.value_or("") == segment}};
+  for (const auto& [option, name, same] : names) {
+    if (same && is_utf8(name)) continue;
+    return invalid(fmt::format("{}: {}: a case file cannot name this: it must be UTF-8", option,
+                               in_quotes(name)));
+  }
+  return {};
+}
+
 // ---- what is guessed ----
 
 fs::path beside(const fs::path& out, const std::string& what) {
@@ -174,6 +189,9 @@ fs::path beside(const fs::path& out, const std::string& what) {
 Result<VoxelImage> read_labels(const fs::path& path) {
   auto map = io::read_volume(path);
   if (!map) return map;
+  if (Status good = anatomy::check_label_map(*map, "--labels: " + path.string()); !good) {
+    return tl::unexpected(good.error());
+  }
   const auto names = io::label_names_beside(path);
   if (!names) return tl::unexpected(names.error());
   if (names->empty()) return map;
@@ -438,9 +456,9 @@ Result<InitSummary> write_first_case(const InitOptions& options) {
   if (Status ok = guess_tumour(draft, *brain); !ok) return tl::unexpected(ok.error());
   guess_stem(draft, *brain, labels);
   const std::string text = case_text(draft);
-  if (const auto read = io::parse_case_config(text, options.out); !read) {
-    return tl::unexpected(read.error());
-  }
+  const auto read = io::parse_case_config(text, options.out);
+  if (!read) return tl::unexpected(read.error());
+  if (Status same = check_names(draft, *read); !same) return tl::unexpected(same.error());
   auto files = write_files(draft, *brain, text);
   if (!files) return tl::unexpected(files.error());
   InitSummary summary;

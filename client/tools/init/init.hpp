@@ -40,8 +40,9 @@ struct InitSummary {
   std::vector<std::filesystem::path> files;
 };
 
-// Writes the case, which io::read_case_config reads. kInvalidArgument: options that are missing
-// (all of them in one sentence), a case or volume that is there already, a position, labels that
+// Writes the case, which io::read_case_config reads with the same names. kInvalidArgument: options
+// that are missing (all of them in one sentence), a case or volume that is there already, a name
+// that is no UTF-8, a position, a label map with values that are no whole numbers, labels that
 // the tumour's map does not have (those that it has are listed), several labels and none chosen
 // where they are not BraTS's (1, 2 and 3 or 4: then all but 2, oedema), a segmentation or structure
 // set of another frame of reference than the series, a tumour of more than half the brain. Errors

@@ -3,7 +3,9 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cmath>
+#include <iterator>
 #include <optional>
 
 #include "common/configuration/case_keys.hpp"
@@ -29,22 +31,6 @@ std::string yaml_list(const std::vector<double>& values) {
   return fmt::format("[{:.17g}]", fmt::join(values, ", "));
 }
 
-// Double-quoted YAML: only these need an escape in printable text; control characters by number.
-std::string quoted(const std::string& value) {
-  std::string out = "\"";
-  for (const char c : value) {
-    if (c == '"' || c == '\\') {
-      out += '\\';
-      out += c;
-    } else if (static_cast<unsigned char>(c) < 0x20) {
-      out += fmt::format("\\x{:02x}", static_cast<unsigned>(c));
-    } else {
-      out += c;
-    }
-  }
-  return out + "\"";
-}
-
 // Visitor of a key table (configuration/key_table.hpp) that writes every key with its value as
 // YAML: absolute paths, numbers with 17 significant digits, which give every double back.
 class KeyWriter : public KeyWalker<KeyWriter> {
@@ -65,10 +51,10 @@ class KeyWriter : public KeyWalker<KeyWriter> {
                                 : fmt::format("[{}]", fmt::join(value, ", ")));
   }
   void operator()(const Key& key, const std::string& value, Need = Need::kOptional) {
-    line(key, quoted(value));
+    line(key, yaml_text(value));
   }
   void operator()(const Key& key, const fs::path& value, Need = Need::kOptional) {
-    line(key, quoted(value.empty() ? "" : fs::absolute(value).lexically_normal().string()));
+    line(key, yaml_text(value.empty() ? "" : fs::absolute(value).lexically_normal().string()));
   }
   template <typename T>
   void operator()(const Key& key, const std::optional<T>& value) {
@@ -76,10 +62,18 @@ class KeyWriter : public KeyWalker<KeyWriter> {
   }
   template <typename T, typename W, std::size_t N>
   void operator()(const Key& key, const T& value, const Word<W> (&words)[N]) {
-    line(key, quoted(word_of(value, words)));
+    line(key, yaml_text(word_of(value, words)));
   }
   void open(const Key& key) { line(key, ""); }
+  template <typename Body>
+  void section(const Key& key, Need need, Body&& body) {
+    const bool idle = !labels_ && std::find(std::begin(kNeedLabels), std::end(kNeedLabels),
+                                            full(key)) != std::end(kNeedLabels);
+    if (!idle) KeyWalker::section(key, need, body);
+  }
 
+  // labels: the case has anatomy.labels.
+  explicit KeyWriter(bool labels) : labels_(labels) {}
   const std::string& text() const { return text_; }
 
  private:
@@ -87,8 +81,37 @@ class KeyWriter : public KeyWalker<KeyWriter> {
     text_.append(2 * depth(), ' ').append(key.name).append(value.empty() ? ":" : ": ");
     text_.append(value).append("\n");
   }
+  bool labels_;
   std::string text_;
 };
+
+// Fails for each section of kNeedLabels that holds keys.
+void refuse_without_labels(YamlSection& root) {
+  for (const std::string key : kNeedLabels) {
+    const std::size_t dot = key.find('.');
+    YamlSection outer = dot == std::string::npos ? root : root.section(key.substr(0, dot));
+    const std::string name = key.substr(dot == std::string::npos ? 0 : dot + 1);
+    if (!outer.section(name).given()) continue;
+    outer.fail(name,
+               "does nothing without anatomy.labels, the label map of the head: give it, or "
+               "leave this section out");
+  }
+}
+
+Result<CaseConfig> parse_case(const std::string& text, const fs::path& file, bool by_hand) {
+  const auto read = [by_hand](YamlSection& root, CaseConfig& config) {
+    KeyReader reader(root);
+    visit(reader, config);
+    if (by_hand && !config.anatomy.labels) refuse_without_labels(root);
+  };
+  const auto check = [](const CaseConfig& config) { return brainshift::validate(config); };
+  auto config = parse_yaml<CaseConfig>(text, file, read, check);
+  if (!config) return config;
+  config->file = fs::absolute(file).lexically_normal();
+  config->gravity_direction = unit(config->gravity_direction);
+  config->craniotomy.long_axis_direction = unit(config->craniotomy.long_axis_direction);
+  return config;
+}
 
 // Puts what the files of a case hold into their places.
 class Loader {
@@ -123,27 +146,33 @@ class Loader {
 
 }  // namespace
 
+// Only these need an escape in printable text; control characters by number.
+std::string yaml_text(const std::string& value) {
+  std::string out = "\"";
+  for (const char c : value) {
+    if (c == '"' || c == '\\') {
+      out += '\\';
+      out += c;
+    } else if (static_cast<unsigned char>(c) < 0x20) {
+      out += fmt::format("\\x{:02x}", static_cast<unsigned>(c));
+    } else {
+      out += c;
+    }
+  }
+  return out + "\"";
+}
+
 Result<CaseConfig> parse_case_config(const std::string& text, const fs::path& file) {
-  const auto read = [](YamlSection& root, CaseConfig& config) {
-    KeyReader reader(root);
-    visit(reader, config);
-  };
-  const auto check = [](const CaseConfig& config) { return brainshift::validate(config); };
-  auto config = parse_yaml<CaseConfig>(text, file, read, check);
-  if (!config) return config;
-  config->file = fs::absolute(file).lexically_normal();
-  config->gravity_direction = unit(config->gravity_direction);
-  config->craniotomy.long_axis_direction = unit(config->craniotomy.long_axis_direction);
-  return config;
+  return parse_case(text, file, false);
 }
 
 Result<CaseConfig> read_case_config(const fs::path& path) {
   return read_file(path).and_then(
-      [&](const std::string& text) { return parse_case_config(text, path); });
+      [&](const std::string& text) { return parse_case(text, path, true); });
 }
 
 std::string case_config_text(const CaseConfig& config) {
-  KeyWriter writer;
+  KeyWriter writer(config.anatomy.labels.has_value());
   visit(writer, config);
   return writer.text();
 }

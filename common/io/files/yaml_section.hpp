@@ -52,6 +52,8 @@ class YamlDocument {
 class YamlSection {
  public:
   bool has(const std::string& key);
+  // Whether the section is there and holds keys.
+  bool given() const { return node_ != nullptr; }
   // A missing optional section has no keys.
   YamlSection section(const std::string& key, Presence presence = Presence::kOptional);
   // Which one of `keys` is present; "" (and an error, if required) for none or several.

@@ -55,6 +55,8 @@ Result<LabelNames> parse_names(const std::string& content) {
       return bad_line(number, line, "names an index that an earlier line has");
     }
   }
+  if (!headed) return unreadable("is empty: must have a heading with index and name");
+  if (names.empty()) return unreadable("has no row below its heading, so no label has a name");
   return names;
 }
 

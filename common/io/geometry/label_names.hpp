@@ -16,7 +16,7 @@ namespace brainshift::io {
 using LabelNames = std::map<int, std::string>;
 
 // kNotFound; kUnreadable naming file and line: a heading without index or name, an index that is no
-// whole number or stands twice, a row without a name.
+// whole number or stands twice, a row without a name; a table without heading or rows.
 Result<LabelNames> read_label_names(const std::filesystem::path& path);
 
 // The table beside a map: sub-1_dseg.tsv beside sub-1_dseg.nii.gz. No names where there is none.

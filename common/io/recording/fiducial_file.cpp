@@ -89,6 +89,9 @@ Result<FiducialFile> read_fiducials(const std::filesystem::path& path) {
     auto fit = rows.single ? registration::match_fiducials(reference, ras)
                            : registration::register_fiducials(reference, ras);
     if (!fit) return tl::unexpected(fit.error());
+    if (Status head = registration::check_head_fit(reference, *fit); !head) {
+      return tl::unexpected(head.error());
+    }
     return FiducialFile{std::move(*fit), rows.single};
   });
 }

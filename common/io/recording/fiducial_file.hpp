@@ -23,8 +23,8 @@ struct FiducialFile {
   bool matched = false;                    // the correspondence was found, not given
 };
 
-// kNotFound; kUnreadable naming file and line; the errors of register_fiducials and
-// match_fiducials, naming the file.
+// kNotFound; kUnreadable naming file and line; the errors of register_fiducials, match_fiducials
+// and check_head_fit, naming the file.
 Result<FiducialFile> read_fiducials(const std::filesystem::path& path);
 
 }  // namespace brainshift::io

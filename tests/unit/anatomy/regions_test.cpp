@@ -201,6 +201,8 @@ TEST(Regions, MapsThatCannotGiveWhatIsAskedForAreNamed) {
   CaseInputs image = labelled_case();
   image.labels->values[1000] = 0.25F;
   EXPECT_THAT(refusal(image), HasSubstr("is no label map: it has the value 0.25"));
+  image.label_names = {{2, "Left-Cerebral-White-Matter"}};  // whose numbers round the values
+  EXPECT_THAT(refusal(image), HasSubstr("is no label map: it has the value 0.25"));
   CaseInputs ready = labelled_case();
   ready.config.mesh = MeshFile{"head.msh"};
   EXPECT_THAT(refusal(ready), HasSubstr("anatomy.labels: needs a mesh that is generated"));

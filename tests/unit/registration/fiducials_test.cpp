@@ -209,6 +209,33 @@ TEST(Fiducials, MixedUpUnitsAreNamed) {
   EXPECT_THAT(sentence_of(match_fiducials(0.001 * image, image)), HasSubstr("metres?"));
 }
 
+std::string head_refusal(const Points& measured, const Points& image) {
+  const auto fit = value_or_fail(register_fiducials(measured, image));
+  const Status head = check_head_fit(measured, fit);
+  return head ? "" : head.error().message;
+}
+
+TEST(Fiducials, OfNoHeadAreRefusedByTheirLikelyMistake) {
+  const Points image = markers();
+  EXPECT_THAT(head_refusal(0.001 * image, 0.001 * image),
+              HasSubstr("the image's span 0.19 mm: must span 30 to 500 mm; in metres"));
+  EXPECT_THAT(head_refusal(0.1 * image, 0.1 * image), HasSubstr("; in centimetres"));
+  EXPECT_THAT(sentence_of(match_fiducials(0.001 * image, 0.001 * image)), HasSubstr("in metres"));
+  Points flat = image;  // a mirror image of it fits nearly as well
+  flat.row(1) *= 0.03;
+  Points mirrored = flat;
+  mirrored.row(1) *= -1.0;
+  EXPECT_THAT(
+      head_refusal(mirrored, flat),
+      testing::AllOf(HasSubstr("the best fit leaves 3.9 mm"), HasSubstr("without a mistake; "),
+                     HasSubstr("with left and right exchanged?")));
+  mirrored = image;
+  mirrored.row(0) *= -1.0;
+  EXPECT_THAT(sentence_of(match_fiducials(mirrored, image)), HasSubstr("left and right exchanged"));
+  Random random(2);
+  EXPECT_EQ(head_refusal(localised(image, 6.0, random), image), "");
+}
+
 TEST(Fiducials, MatchingRefusesNumbersAndOptionsOutOfRange) {
   const auto refused = [](const Points& measured, const Points& image, const MatchOptions& options,
                           const std::string& naming) {

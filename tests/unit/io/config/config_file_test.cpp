@@ -251,6 +251,22 @@ TEST(CaseFile, AnatomyIsReadAndWritten) {
               testing::HasSubstr("anatomy.labels: needs a mesh that is generated (mesh.generate)"));
 }
 
+TEST(CaseFile, SectionsThatDoNothingWithoutLabelsAreRefusedByKey) {
+  const test_support::TemporaryFolder folder;
+  const auto refusal = [&](const std::string& section) {
+    return sentence_of(read_case_config(folder.write("c.yaml", kMinimal + section)));
+  };
+  EXPECT_THAT(refusal("anatomy: {septa: on}\n"),
+              testing::HasSubstr("c.yaml:6: anatomy: does nothing without anatomy.labels"));
+  EXPECT_THAT(
+      refusal("material:\n  tissues: {brainstem: 1.8}\n"),
+      testing::HasSubstr("c.yaml:7: material.tissues: does nothing without anatomy.labels"));
+  value_or_fail(read_case_config(folder.write("c.yaml", kMinimal + std::string("anatomy:\n"))));
+  const CaseConfig plain = value_or_fail(parse(kMinimal));
+  value_or_fail(read_case_config(folder.write("c.yaml", case_config_text(plain))));
+  value_or_fail(parse(kMinimal + std::string("anatomy: {septa: on}\n")));  // of an earlier model
+}
+
 TEST(CaseFile, BadFilesAreRefusedInOneLineThatNamesFileLineKeyAndValue) {
   expect_edits_refused(
       parse, kFull,

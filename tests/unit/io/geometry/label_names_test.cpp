@@ -32,6 +32,8 @@ TEST(LabelNames, WhatIsWrongIsNamedWithItsLine) {
   EXPECT_THAT(refusal("index\tname\n1.5\ta\n"), HasSubstr("line 2"));
   EXPECT_THAT(refusal("index\tname\n1\ta\n1\tb\n"), HasSubstr("line 3"));
   EXPECT_THAT(refusal("index\tname\n1\n"), HasSubstr("and a name"));
+  EXPECT_THAT(refusal(""), HasSubstr("a.tsv: is empty"));
+  EXPECT_THAT(refusal("index\tname\n\n"), HasSubstr("a.tsv: has no row below its heading"));
 }
 
 }  // namespace

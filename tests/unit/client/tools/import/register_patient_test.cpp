@@ -222,6 +222,55 @@ TEST_F(RegisterPatient, FiducialsNearlyOnALineAreWarnedOf) {
   EXPECT_THAT(lines, Contains(HasSubstr("three fiducials leave little")));
 }
 
+// Rows of points touched, changed as a user's list may be.
+template <typename Change>
+std::string touched_csv(const Change& change) {
+  std::string text = "name,x,y,z\n";
+  for (std::size_t i = 0; i < kFiducials.size(); ++i) {
+    const Vec3 at = change(Vec3(VirtualStylus::T_ras_reference().inverse() * kFiducials[i]), i);
+    text += kNames[i] + "," + std::to_string(at.x()) + "," + std::to_string(at.y()) + "," +
+            std::to_string(at.z()) + "\n";
+  }
+  return text;
+}
+
+TEST_F(RegisterPatient, ListsThatNoHeadHasAreRefusedByTheirLikelyMistake) {
+  options.recording.clear();
+  const auto refused = [&](const auto& change) {
+    options.fiducials = folder.write("touched.csv", touched_csv(change));
+    return refusal();
+  };
+  const auto touched = [](std::size_t i) {
+    return Vec3(VirtualStylus::T_ras_reference().inverse() * kFiducials[i]);
+  };
+  EXPECT_THAT(refused([&](const Vec3& x, std::size_t i) { return i < 2 ? touched(1 - i) : x; }),
+              AllOf(HasSubstr("touched.csv and "), HasSubstr("fiducials.fcsv: fiducials: the best"),
+                    HasSubstr("mm rms: must leave at most 10 mm; \"nasion\" and \"left ear\" "
+                              "exchanged?")));
+  EXPECT_THAT(refused([](const Vec3& x, std::size_t) { return Vec3(-x.x(), x.y(), x.z()); }),
+              HasSubstr("at most 10 mm; with left and right exchanged?"));
+  EXPECT_THAT(refused([](const Vec3& x, std::size_t i) { return i == 1 ? Vec3(1.5 * x) : x; }),
+              HasSubstr("; are both lists of this head, mm, and in the same order?"));
+}
+
+TEST_F(RegisterPatient, APoorFitIsWarnedOf) {
+  options.recording.clear();
+  options.fiducials = folder.write("touched.csv", touched_csv([](const Vec3& x, std::size_t i) {
+                                     return i == 1 ? Vec3(x + Vec3(0, 0, 18)) : x;
+                                   }));
+  const auto report = value_or_fail(register_patient(options));
+  EXPECT_GT(report.fiducials.fre_mm, 5.0);
+  EXPECT_THAT(report_lines(report),
+              Contains(HasSubstr("note: a registration error above 5 mm rms is poor")));
+}
+
+TEST_F(RegisterPatient, ATargetOutsideOfTheHeadIsRefused) {
+  options.target = Vec3(46, -47, 900);
+  EXPECT_THAT(refusal(), AllOf(HasSubstr("--target (46.0, -47.0, 900.0) lies "),
+                               HasSubstr("from the middle of the fiducials in the image"),
+                               HasSubstr("must lie within 300 mm")));
+}
+
 TEST_F(RegisterPatient, PosesThatTheTrackerLostAreLeftOut) {
   SequenceContent content = stylus.content();
   for (std::size_t i = 20; i < 25; ++i)

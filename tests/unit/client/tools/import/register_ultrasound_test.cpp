@@ -236,6 +236,15 @@ TEST_F(RegisterUltrasound, NamesWhatIsMissingOrWrong) {
                              RigidTransform(Eigen::Translation3d(300, 0, 0)) * kTruth));
   EXPECT_THAT(with([&](O& o) { o.registration = far; }),
               HasSubstr("us.mha: image registration: 0 % of the samples lie inside the MRI"));
+  VoxelImage other = registration::test::image_of(Blobs(11));
+  std::fill(other.values.begin(), other.values.end(), 0.0F);
+  other.values.front() = 1.0F;
+  put("other.nii.gz", other);
+  EXPECT_THAT(with([&](O& o) { o.brain = folder / "other.nii.gz"; }),
+              AllOf(HasSubstr("0 % of the samples lie inside the brain: at least"),
+                    HasSubstr("and --brain " + (folder / "other.nii.gz").string())));
+  EXPECT_THAT(with([](O& o) { o.target = Vec3(6, -4, 500); }),
+              HasSubstr("--target (6.0, -4.0, 500.0) lies 500 mm from the middle of the brain in"));
   SequenceContent content = VirtualProbe().content();
   for (auto& frame : content.frames) frame["ProbeToTrackerTransformStatus"] = "INVALID";
   record(content);

@@ -167,6 +167,53 @@ TEST_F(FirstCase, ATumourWithinAnotherThatIsChosenIsOfTheWhole) {
   EXPECT_THAT(std::get<TumourLabel>(config.tumour).labels, ElementsAre(2));
 }
 
+TEST_F(FirstCase, LabelsThatAreNoWholeNumbersAreRefused) {
+  VoxelImage labels = drawn(label_at);
+  labels.values[labels.values.size() / 2] = 41.4F;
+  put("labels.nii", labels);
+  const std::string no_map = "labels.nii: is no label map: it has the value 41.4, no whole number";
+  EXPECT_THAT(refusal(), AllOf(HasSubstr("--labels: "), HasSubstr(no_map)));
+  folder.write("labels.tsv", "index\tname\n41\tRight-Cerebral-White-Matter\n16\tBrain-Stem\n");
+  EXPECT_THAT(refusal(), HasSubstr(no_map));
+}
+
+TEST_F(FirstCase, AwkwardNamesComeBackFromTheCase) {
+  options.mri = folder / "t1: #1 'a'.nii", options.labels = folder / "la\nbels: [é].nii";
+  std::filesystem::rename(folder / "t1.nii", options.mri);
+  std::filesystem::rename(folder / "labels.nii", options.labels);
+  const VoxelImage lesion = drawn(lesion_at);
+  std::string bytes(lesion.values.begin(), lesion.values.end());
+  options.tumour = folder.write(
+      "tu\"mo\\ur.seg.nrrd",
+      "NRRD0004\ntype: uint8\ndimension: 3\nspace: right-anterior-superior\nsizes: 70 80 80\n"
+      "space directions: (3,0,0) (0,3,0) (0,0,3)\nspace origin: (-105,-120,-130)\n"
+      "encoding: raw\nSegment0_Name:=Mass\nSegment0_LabelValue:=1\n"
+      "Segment1_Name:=Rim: \"é\" #1\nSegment1_LabelValue:=4\n\n" +
+          bytes);
+  EXPECT_THAT(refusal(), HasSubstr("has 2 segments: name one of \"Mass\", \"Rim: \"é\" #1\" "
+                                   "(--tumour-segment)"));
+  options.tumour_segment = "Rim: \"é\" #1";
+  options.out = folder / " odd: \"é\"\n#1 .yaml";
+  const CaseConfig config = written();
+  EXPECT_EQ(config.case_id, " odd: \"é\"\n#1 ");
+  EXPECT_EQ(config.mri, options.mri);
+  EXPECT_EQ(config.brain, folder / " odd: \"é\"\n#1 -brain.nii.gz");
+  EXPECT_EQ(std::get<TumourLabel>(config.tumour).path, options.tumour);
+  EXPECT_EQ(std::get<TumourLabel>(config.tumour).segment, options.tumour_segment);
+  options.out = folder / "odd\xff.yaml";
+  EXPECT_THAT(refusal(), HasSubstr("--out: \"odd?\": a case file cannot name this"));
+}
+
+TEST_F(FirstCase, ATumourIsNamedByTheOptionThatIsForItsFile) {
+  options.tumour_label = "1", options.tumour_segment = "Mass";
+  EXPECT_THAT(refusal(), HasSubstr("--tumour-label \"1\" and --tumour-segment \"Mass\": give one"));
+  options.tumour_label.clear();
+  EXPECT_THAT(refusal(), HasSubstr("only a .seg.nrrd file does"));
+  options.tumour = folder.write("seg.dcm", io::Segmentation().set(1, 4).set(2, 4).bytes());
+  EXPECT_THAT(refusal(), AllOf(HasSubstr("--tumour-segment: \"Mass\": is for a .seg.nrrd"),
+                               HasSubstr("seg.dcm is DICOM")));
+}
+
 TEST_F(FirstCase, LabelsOfAnotherNumberingAreRefusedByFile) {
   options.labels = options.tumour;
   EXPECT_THAT(refusal(), AllOf(HasSubstr("tumour.nii"), HasSubstr("FreeSurfer's numbers")));
