@@ -70,7 +70,7 @@ class Regions {
 
   static constexpr double kReach_mm = 5.0, kClear_mm = 2.5;
   // Of the map's brain the share that may lie farther than kSlack_mm outside the mask, of the mask
-  // the share that may lie farther than 20 mm from any label. AAL on its own head has 0.5 % outside;
+  // the share that may lie farther than 20 mm from any label. AAL on its own head has 0.5 % there;
   // moved by 5 mm 4 to 5 %, by 10 mm 9 to 11 %.
   static constexpr double kSlack_mm = 3.0, kFarLabels = 0.04, kFarBrain = 0.05;
 
