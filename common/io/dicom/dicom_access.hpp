@@ -24,6 +24,9 @@ tl::unexpected<Error> wrong_tag(const char* tag, const std::string& what);
 // An element's text; empty where there is none.
 std::string text_of(DcmItem& item, const DcmTagKey& key);
 
+// The same in quotes, for a refusal.
+std::string said(DcmItem& item, const DcmTagKey& key);
+
 // Takes all of `numbers`; false unless as many are there and finite.
 template <std::size_t N>
 bool take_numbers(DcmItem& item, const DcmTagKey& key, std::array<double, N>& numbers) {

@@ -7,6 +7,7 @@
 #include <array>
 #include <cmath>
 #include <cstdint>
+#include <limits>
 #include <map>
 #include <memory>
 #include <vector>
@@ -23,6 +24,7 @@ namespace fs = std::filesystem;
 
 constexpr double kSameDirection = 1e-4, kSameSpacing = 1e-4;
 constexpr int kMaxDicomVoxelsAlong = 32767;
+constexpr double kLargestStored = 65535.0;
 
 struct Slice {
   fs::path file;
@@ -47,6 +49,30 @@ void take_values(const Stored* stored, std::size_t count, int bits, bool is_sign
   }
 }
 
+// Left as they are where the file has none.
+Status take_rescale(DcmDataset& data, double& slope, double& intercept) {
+  std::array<double, 1> number{};
+  if (data.tagExists(DCM_RescaleSlope)) {
+    if (!take_numbers(data, DCM_RescaleSlope, number) || number[0] == 0.0) {
+      return wrong_tag("RescaleSlope (0028,1053)",
+                       said(data, DCM_RescaleSlope) + ": must be finite and not 0");
+    }
+    slope = number[0];
+  }
+  if (data.tagExists(DCM_RescaleIntercept)) {
+    if (!take_numbers(data, DCM_RescaleIntercept, number)) {
+      return wrong_tag("RescaleIntercept (0028,1052)",
+                       said(data, DCM_RescaleIntercept) + ": must be finite");
+    }
+    intercept = number[0];
+  }
+  if (std::abs(slope) * kLargestStored + std::abs(intercept) > std::numeric_limits<float>::max()) {
+    return wrong_tag("RescaleSlope, RescaleIntercept (0028,1052-53)",
+                     fmt::format("{:g} and {:g}: values would be too large", slope, intercept));
+  }
+  return {};
+}
+
 Status take_pixels(DcmDataset& data, Slice& slice) {
   Uint16 columns = 0, rows = 0, samples = 1, allocated = 0, stored = 0, is_signed = 0;
   data.findAndGetUint16(DCM_Columns, columns);
@@ -67,14 +93,8 @@ Status take_pixels(DcmDataset& data, Slice& slice) {
         fmt::format("{} and {}: must be 8 or 16, and at most that", allocated, stored));
   }
   slice.size = {columns, rows};
-  std::array<double, 1> slope{1.0}, intercept{0.0};
-  if (data.tagExists(DCM_RescaleSlope) && !take_numbers(data, DCM_RescaleSlope, slope)) {
-    return wrong_tag("RescaleSlope (0028,1053)", "must be a number");
-  }
-  if (data.tagExists(DCM_RescaleIntercept) &&
-      !take_numbers(data, DCM_RescaleIntercept, intercept)) {
-    return wrong_tag("RescaleIntercept (0028,1052)", "must be a number");
-  }
+  double slope = 1.0, intercept = 0.0;
+  if (Status ok = take_rescale(data, slope, intercept); !ok) return ok;
   if (Status ok = expand_pixels(data); !ok) return ok;
   const auto count = static_cast<std::size_t>(columns) * rows;
   unsigned long there = 0;
@@ -90,9 +110,9 @@ Status take_pixels(DcmDataset& data, Slice& slice) {
                      fmt::format("has {} pixels: must be {} x {}", there, columns, rows));
   }
   if (bytes != nullptr) {
-    take_values(bytes, count, stored, is_signed != 0, slope[0], intercept[0], slice.values);
+    take_values(bytes, count, stored, is_signed != 0, slope, intercept, slice.values);
   } else {
-    take_values(words, count, stored, is_signed != 0, slope[0], intercept[0], slice.values);
+    take_values(words, count, stored, is_signed != 0, slope, intercept, slice.values);
   }
   return {};
 }
@@ -141,6 +161,13 @@ Status check_one_series(const std::vector<Slice>& slices) {
   }
   const Slice& first = slices.front();
   for (const Slice& slice : slices) {
+    if (slice.frame_of_reference != first.frame_of_reference) {
+      return unreadable(
+          fmt::format("{} and {} differ in FrameOfReferenceUID (0020,0052), {} and {}: not slices "
+                      "of one volume",
+                      first.file.filename().string(), slice.file.filename().string(),
+                      in_quotes(first.frame_of_reference), in_quotes(slice.frame_of_reference)));
+    }
     const bool directions =
         (slice.plane.along_row - first.plane.along_row).norm() < kSameDirection &&
         (slice.plane.along_column - first.plane.along_column).norm() < kSameDirection;

@@ -107,6 +107,10 @@ TEST_F(DicomSeriesOf, WhatIsNoVolumeIsRefusedByName) {
   add("b.dcm", Image("-24").set({0x0020, 0x000e}, "UI", even("1.2.4", '\0')));
   EXPECT_THAT(refusal(),
               AllOf(HasSubstr("several series"), HasSubstr("\"T1 sagittal\" of 2 images")));
+  add("b.dcm", Image("-24").set({0x0020, 0x0052}, "UI", even("1.2.5", '\0')));
+  EXPECT_THAT(refusal(),
+              HasSubstr("a.dcm and b.dcm differ in FrameOfReferenceUID (0020,0052), \"\" "
+                        "and \"1.2.5\""));
   add("b.dcm", Image("-24").set({0x0028, 0x0030}, "DS", even("2\\0.6")));
   EXPECT_THAT(refusal(), HasSubstr("differ in pixel spacing"));
   add("b.dcm", Image("-24").set({0x0020, 0x0037}, "DS", even("1\\0\\0\\0\\1\\0")));
@@ -122,6 +126,11 @@ TEST_F(DicomSeriesOf, AWrongTagIsNamedWithItsFile) {
               AllOf(HasSubstr("b.dcm"), HasSubstr("(0020,0032)")));
   EXPECT_THAT(with({0x0020, 0x0037}, "DS", even("0\\2\\0\\0\\0\\-1")), HasSubstr("(0020,0037)"));
   EXPECT_THAT(with({0x0028, 0x0030}, "DS", "0\\1 "), HasSubstr("(0028,0030)"));
+  for (const std::string slope : {"0", "nan", "1e999"}) {
+    EXPECT_THAT(with({0x0028, 0x1053}, "DS", even(slope)),
+                HasSubstr("b.dcm: RescaleSlope (0028,1053): \"" + slope + "\": must be finite"));
+  }
+  EXPECT_THAT(with({0x0028, 0x1053}, "DS", even("1e300")), HasSubstr("would be too large"));
   EXPECT_THAT(with({0x0028, 0x0008}, "IS", "12"), HasSubstr("enhanced"));
   EXPECT_THAT(with({0x0028, 0x0002}, "US", us(3)), HasSubstr("colour"));
   EXPECT_THAT(with({0x0028, 0x0010}, "US", us(9)), HasSubstr("has 6 pixels"));
