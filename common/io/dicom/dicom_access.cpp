@@ -70,6 +70,10 @@ Result<ImagePlane> image_plane(DcmItem& place, DcmItem& orientation, DcmItem& me
   return plane;
 }
 
+Vec3 normal_of(const ImagePlane& plane) {
+  return plane.along_row.cross(plane.along_column).normalized();
+}
+
 Status expand_pixels(DcmDataset& data) {
   if (data.chooseRepresentation(EXS_LittleEndianExplicit, nullptr).good()) return {};
   const DcmXfer syntax(data.getOriginalXfer());
