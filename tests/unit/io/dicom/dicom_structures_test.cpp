@@ -16,6 +16,7 @@ using test_support::DrawnStructure;
 using test_support::StructureSet;
 using test_support::TemporaryFolder;
 using testing::AllOf;
+using testing::ElementsAre;
 using testing::HasSubstr;
 
 class DicomStructuresOf : public testing::Test {
@@ -48,8 +49,21 @@ TEST_F(DicomStructuresOf, ContoursAreWhereTheFileSaysInRas) {
   ASSERT_EQ(gtv.contours.size(), 2u);
   EXPECT_LT((gtv.contours[1] - set.structures[0].contours[1].points).norm(), 1e-9);
   EXPECT_EQ(read_set.structures[1].defect, "has no contour");
-  EXPECT_EQ(read_set.frame_of_reference, "1.2.3.4");
-  EXPECT_EQ(read_set.series, "1.2.3");
+  EXPECT_EQ(gtv.frame_of_reference, "1.2.3.4");
+  EXPECT_THAT(gtv.series, ElementsAre("1.2.3"));
+}
+
+TEST_F(DicomStructuresOf, EachStructureLiesInItsOwnFrameOfReference) {
+  set.other_frame = "1.2.3.7";
+  set.structures[1].frame_of_reference = "1.2.3.7";
+  const auto structures = read().structures;
+  EXPECT_EQ(structures[0].frame_of_reference, "1.2.3.4");
+  EXPECT_THAT(structures[0].series, ElementsAre("1.2.3"));
+  EXPECT_EQ(structures[1].frame_of_reference, "1.2.3.7");
+  EXPECT_THAT(structures[1].series, ElementsAre("1.2.88"));
+  set.structures[1].frame_of_reference = " ";
+  EXPECT_THAT(refusal(), AllOf(HasSubstr("(3006,0024): structure 3 \"Isocentre\" has none"),
+                               HasSubstr("names 2 frames of reference")));
 }
 
 TEST_F(DicomStructuresOf, ARepeatedEndIsOnePointAndXorIsAContour) {
