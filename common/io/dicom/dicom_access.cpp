@@ -17,6 +17,8 @@ namespace brainshift::io {
 void prepare_dcmtk() {
   static const bool once = [] {
     OFLog::configure(OFLogger::OFF_LOG_LEVEL);
+    // A value too long for the length field of its type is written as UN (PS3.5, 6.2.2).
+    dcmEnableUnknownVRConversion.set(OFTrue);
     DcmRLEDecoderRegistration::registerCodecs();
     DJDecoderRegistration::registerCodecs();
     DJLSDecoderRegistration::registerCodecs();

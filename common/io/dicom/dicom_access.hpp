@@ -16,7 +16,7 @@
 
 namespace brainshift::io {
 
-// DCMTK prints to stderr and knows no compression until it is told.
+// DCMTK prints to stderr, knows no compression and leaves UN unread until it is told.
 void prepare_dcmtk();
 
 // kUnreadable: "NAME (gggg,eeee): what".

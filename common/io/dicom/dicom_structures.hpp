@@ -3,7 +3,7 @@
 //
 // Contours are places in the patient (LPS, mm) in the structure's own frame of reference, which the
 // reader turns into RAS; images, slices and instance numbers that the file refers to do not count.
-// filled_contours.hpp turns them into voxels.
+// ContourData longer than 64 KiB may have the type UN. filled_contours.hpp turns them into voxels.
 // Source: DICOM PS3.3, A.19, C.8.8.5 (structure set) and C.8.8.6 (ROI contour).
 #pragma once
 
