@@ -7,6 +7,7 @@
 #include <CGAL/Mesh_criteria_3.h>
 #include <CGAL/Mesh_triangulation_3.h>
 #include <CGAL/Random.h>
+#include <CGAL/assertions_behaviour.h>
 #include <CGAL/exude_mesh_3.h>
 #include <CGAL/make_mesh_3.h>
 #include <CGAL/perturb_mesh_3.h>
@@ -131,11 +132,24 @@ std::optional<Enclosure> enclose(const VoxelImage& mask, float level) {
   return result;
 }
 
+// What goes wrong is a status here; CGAL would print it too.
+void silence_cgal() {
+  const auto nothing = [](const char*, const char*, const char*, int, const char*) {};
+  static const bool once = [&] {
+    CGAL::set_warning_handler(nothing);
+    CGAL::set_error_handler(nothing);
+    return true;
+  }();
+  static_cast<void>(once);
+}
+
 // division: null for a domain of one region.
 Complex refine(const VoxelImage& smooth_mask, const Enclosure& enclosure, const Division* division,
                const SizingField& edge_mm, const MeshingOptions& options,
                const Progress& progress) {
   namespace p = CGAL::parameters;
+  silence_cgal();
+  const auto begin = p::mesh_3_options(p::number_of_initial_points = options.first_points);
   const Interpolator mask(smooth_mask);
   const double level = options.level;
   const auto outside_positive = [&mask, level](const Kernel::Point_3& x) {
@@ -164,9 +178,9 @@ Complex refine(const VoxelImage& smooth_mask, const Enclosure& enclosure, const 
   // Interfaces that meet are no manifolds.
   Complex complex = division == nullptr
                         ? CGAL::make_mesh_3<Complex>(domain, criteria, p::no_perturb(),
-                                                     p::no_exude(), p::manifold())
+                                                     p::no_exude(), begin, p::manifold())
                         : CGAL::make_mesh_3<Complex>(domain, criteria, p::no_perturb(),
-                                                     p::no_exude(), p::non_manifold());
+                                                     p::no_exude(), begin, p::non_manifold());
   if (!(options.sliver_bound_deg > 0.0)) return complex;
   report(progress, "mesh: perturb", 0.5);
   CGAL::perturb_mesh_3(complex, domain, p::sliver_bound = options.sliver_bound_deg);

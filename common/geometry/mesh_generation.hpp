@@ -26,15 +26,18 @@ struct MeshingOptions {
   // Optimisation stops when no dihedral angle is smaller. 0: no optimisation, for callers that
   // need only the surface.
   double sliver_bound_deg = 12.0;
+  // Points of the surface with which the refinement begins. The default, 12, is too few now and
+  // then for a hollow domain: nothing is meshed then (kEmptySet).
+  int first_points = 12;
 };
 
 // Region of a point of the domain, > 0.
 using RegionField = std::function<int(const Vec3&)>;
 
 // Nodes are numbered along a Morton (Z-order) curve and tetrahedra by their lowest node, so that
-// neighbours in space are neighbours in memory. Only the largest component (connected by faces)
-// is kept, without unused nodes.
-// kEmptySet: the domain is empty. kDegenerateMesh: the largest component fails check_mesh.
+// neighbours in space are neighbours in memory. Only the largest component (connected by faces) is
+// kept, without unused nodes. kEmptySet: the domain is empty, or no tetrahedron came out.
+// kDegenerateMesh: the largest component fails check_mesh.
 Result<TetMesh> mesh_mask(const VoxelImage& smooth_mask, const SizingField& edge_mm,
                           const MeshingOptions& options = {}, const Progress& progress = {});
 

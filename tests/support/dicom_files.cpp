@@ -61,15 +61,21 @@ void put_spacing(DcmItem& item, const VoxelImage& image) {
 void write_structure_set(const fs::path& file, const StructureSet& set) {
   DcmFileFormat format;
   DcmDataset& data = *format.getDataset();
-  DcmItem& frame = add_item(data, DCM_ReferencedFrameOfReferenceSequence);
-  put(frame, DCM_FrameOfReferenceUID, set.frame_of_reference);
-  DcmItem& series =
-      add_item(add_item(frame, DCM_RTReferencedStudySequence), DCM_RTReferencedSeriesSequence);
-  put(series, DCM_SeriesInstanceUID, set.series);
+  const auto refer = [&data](const std::string& uid, const std::string& series_uid) {
+    DcmItem& frame = add_item(data, DCM_ReferencedFrameOfReferenceSequence);
+    put(frame, DCM_FrameOfReferenceUID, uid);
+    DcmItem& series =
+        add_item(add_item(frame, DCM_RTReferencedStudySequence), DCM_RTReferencedSeriesSequence);
+    put(series, DCM_SeriesInstanceUID, series_uid);
+  };
+  if (!set.other_frame.empty()) refer(set.other_frame, "1.2.88");
+  refer(set.frame_of_reference, set.series);
   for (const DrawnStructure& structure : set.structures) {
     DcmItem& roi = add_item(data, DCM_StructureSetROISequence);
     put(roi, DCM_ROINumber, std::to_string(structure.number));
-    put(roi, DCM_ReferencedFrameOfReferenceUID, set.frame_of_reference);
+    put(roi, DCM_ReferencedFrameOfReferenceUID,
+        structure.frame_of_reference.empty() ? set.frame_of_reference
+                                             : structure.frame_of_reference);
     put(roi, DCM_ROIName, structure.name);
     DcmItem& drawn = add_item(data, DCM_ROIContourSequence);
     put(drawn, DCM_ReferencedROINumber, std::to_string(structure.number));

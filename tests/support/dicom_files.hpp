@@ -22,11 +22,13 @@ struct DrawnStructure {
   int number = 1;
   std::string name = "GTV";
   std::vector<DrawnContour> contours;
+  std::string frame_of_reference = {};  // empty: that of the set
 };
 
 struct StructureSet {
   std::vector<DrawnStructure> structures;
   std::string frame_of_reference = "1.2.3.4", series = "1.2.3";
+  std::string other_frame = {};  // of another image, which the file names first; empty: none
 };
 
 void write_structure_set(const std::filesystem::path& file, const StructureSet& set);

@@ -174,6 +174,19 @@ int block_px(const ultrasound::ImagePoses& poses) {
   return static_cast<int>(std::clamp(std::round(kSample_mm / pixel), 1.0, 20.0));
 }
 
+// The expected error is a jackknife over kParts parts, which must err independently: parts of one
+// frame do not.
+Status check_frames(const UltrasoundRegisterOptions& options,
+                    const UltrasoundRegisterReport& report, int frames) {
+  if (frames >= kParts) return {};
+  return io::file_error(
+      ErrorCode::kEmptySet, options.ultrasound,
+      fmt::format(
+          "has too few frames: {} of {} have a valid chain and a place of their own, {} are "
+          "needed",
+          frames, report.frames, kParts));
+}
+
 // Where the frames' samples lie in the reference frame. Fills in what the report says of frames;
 // `poses` keeps those that are used.
 Result<IntensitySamples> reference_samples(const UltrasoundRegisterOptions& options,
@@ -201,6 +214,9 @@ Result<IntensitySamples> reference_samples(const UltrasoundRegisterOptions& opti
         ErrorCode::kEmptySet, options.ultrasound,
         fmt::format("none of {} frames has a valid chain{}", report.frames, reasons));
   }
+  if (Status ok = check_frames(options, report, chain->used); !ok) {
+    return tl::unexpected(ok.error());
+  }
   poses = std::move(chain->T_target_source);
   report.frames_repeated = leave_out_repeats(recording, poses);
   auto samples = ultrasound::frame_samples(
@@ -213,6 +229,10 @@ Result<IntensitySamples> reference_samples(const UltrasoundRegisterOptions& opti
         fmt::format("shows too little: its {} frames lie within {:.1f} mm (standard deviation) of "
                     "one plane, {:g} mm are needed; sweep or tilt the probe across the brain",
                     report.frames_valid - report.frames_repeated, thickness, kLeastThickness_mm));
+  }
+  const int placed_frames = report.frames_valid - report.frames_repeated;
+  if (Status ok = check_frames(options, report, placed_frames); !ok) {
+    return tl::unexpected(ok.error());
   }
   report.samples = samples->positions.cols();
   return samples;

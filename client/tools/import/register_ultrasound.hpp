@@ -57,7 +57,7 @@ inline constexpr double kLeastAgreement = 0.5;
 // A registration by fiducials errs by 2.5 mm on average, and 1 mm is what this one should leave
 // (paper 2.7): above their middle there is little to gain.
 inline constexpr double kLargestError_mm = 1.75;
-inline constexpr int kParts = 8;
+inline constexpr int kParts = 8;  // of the frames, of which there must be as many
 // A direction known ten times worse than the best known one is told.
 inline constexpr double kShownRatio = 1e-2;
 

@@ -119,11 +119,17 @@ std::string listed_segments(const io::LabelNames& names) {
   return list;
 }
 
-Status same_frame(const TumourFile& given, const std::string& own, const MriIdentity& mri) {
-  if (own.empty() || mri.frame_of_reference.empty() || own == mri.frame_of_reference) return {};
-  return invalid(given.file.string() +
-                 ": was drawn in another frame of reference (0020,0052) than --mri: its places "
-                 "are not those of this MRI");
+bool lies_elsewhere(const std::string& own, const MriIdentity& mri) {
+  return !own.empty() && !mri.frame_of_reference.empty() && own != mri.frame_of_reference;
+}
+
+// attribute: where `own` stands.
+Status same_frame(const std::string& attribute, const std::string& own, const MriIdentity& mri) {
+  if (!lies_elsewhere(own, mri)) return {};
+  return invalid(fmt::format(
+      "was drawn in another frame of reference than --mri: {} is {}, --mri has {} (0020,0052): its "
+      "places are not those of this MRI",
+      attribute, in_quotes(own), in_quotes(mri.frame_of_reference)));
 }
 
 // Without labels of which the map has no voxel: they lie within others that were chosen. All of
@@ -136,11 +142,16 @@ std::vector<int> left_in(const VoxelImage& map, const std::vector<int>& labels) 
 }
 
 // Number, name and volume of each structure, or why it has none.
-std::string listed_structures(const io::DicomStructures& set, const VoxelImage& grid) {
+std::string listed_structures(const io::DicomStructures& set, const VoxelImage& grid,
+                              const MriIdentity& mri) {
+  const auto volume = [&](const io::DicomStructure& one) -> Result<double> {
+    if (!one.defect.empty()) return invalid(one.defect);
+    if (lies_elsewhere(one.frame_of_reference, mri)) return invalid("of another image");
+    return io::contours_volume_mm3(one.contours, grid);
+  };
   std::string list;
   for (const io::DicomStructure& one : set.structures) {
-    const auto mm3 = one.defect.empty() ? io::contours_volume_mm3(one.contours, grid)
-                                        : Result<double>(invalid(one.defect));
+    const auto mm3 = volume(one);
     list += fmt::format("{}{} {} ({})", list.empty() ? "" : ", ", one.number, in_quotes(one.name),
                         mm3 ? fmt::format("{:.2f} cc", 1e-3 * *mm3) : mm3.error().message);
   }
@@ -150,7 +161,7 @@ std::string listed_structures(const io::DicomStructures& set, const VoxelImage& 
 // The structures as labels, their numbers and `more`, on the grid; where several lie, the last one
 // chosen.
 Result<VoxelImage> structure_map(const io::DicomStructures& set, const std::vector<int>& numbers,
-                                 int more, const VoxelImage& grid,
+                                 int more, const VoxelImage& grid, const MriIdentity& mri,
                                  std::vector<std::string>& notes) {
   VoxelImage map;
   map.dims = grid.dims, map.T_ras_voxel = grid.T_ras_voxel;
@@ -159,6 +170,11 @@ Result<VoxelImage> structure_map(const io::DicomStructures& set, const std::vect
     const auto one = std::find_if(set.structures.begin(), set.structures.end(),
                                   [&](const auto& other) { return other.number == number; });
     const std::string name = fmt::format("structure {} {}", number, in_quotes(one->name));
+    if (Status same =
+            same_frame("ReferencedFrameOfReferenceUID (3006,0024)", one->frame_of_reference, mri);
+        !same) {
+      return invalid(name + ": " + same.error().message);
+    }
     if (!one->defect.empty()) {
       return invalid(fmt::format("{}: {}: closed planar contours are needed", name, one->defect));
     }
@@ -170,6 +186,10 @@ Result<VoxelImage> structure_map(const io::DicomStructures& set, const std::vect
     notes.push_back(fmt::format("{}, from {} contours in {} planes {:.2f} mm apart", name,
                                 one->contours.size(), filled->planes, filled->spacing_mm));
     for (const std::string& note : filled->notes) notes.push_back(note);
+    if (!one->series.empty() && !mri.series.empty() &&
+        std::find(one->series.begin(), one->series.end(), mri.series) == one->series.end()) {
+      notes.emplace_back("drawn on another series in the MRI's frame of reference");
+    }
   }
   return map;
 }
@@ -178,22 +198,16 @@ Result<GivenTumour> from_structures(const TumourFile& given, const VoxelImage& g
                                     const MriIdentity& mri) {
   const auto set = io::read_dicom_structures(given.file);
   if (!set) return tl::unexpected(set.error());
-  if (Status same = same_frame(given, set->frame_of_reference, mri); !same) {
-    return tl::unexpected(same.error());
-  }
   io::LabelNames names;
   for (const io::DicomStructure& one : set->structures) names[one.number] = one.name;
   const auto choice =
-      only_or_named(given, names, "structure", [&] { return listed_structures(*set, grid); });
+      only_or_named(given, names, "structure", [&] { return listed_structures(*set, grid, mri); });
   if (!choice) return tl::unexpected(choice.error());
   GivenTumour tumour{{}, choice->labels, choice->why, {}, true};
   // 0 is the background of a map.
   const int more = names.empty() ? 0 : std::max(0, 1 - names.begin()->first);
-  auto map = structure_map(*set, choice->labels, more, grid, tumour.notes);
+  auto map = structure_map(*set, choice->labels, more, grid, mri, tumour.notes);
   if (!map) return io::file_error(given.file, map.error());
-  if (!set->series.empty() && !mri.series.empty() && set->series != mri.series) {
-    tumour.notes.emplace_back("drawn on another series in the MRI's frame of reference");
-  }
   for (int& label : tumour.labels) label += more;
   if (more > 0) {
     tumour.notes.push_back(fmt::format("labels are the structures' numbers and {}", more));
@@ -206,8 +220,9 @@ Result<GivenTumour> from_structures(const TumourFile& given, const VoxelImage& g
 Result<GivenTumour> from_segments(const TumourFile& given, const MriIdentity& mri) {
   const auto seg = io::read_dicom_segmentation(given.file);
   if (!seg) return tl::unexpected(seg.error());
-  if (Status same = same_frame(given, seg->frame_of_reference, mri); !same) {
-    return tl::unexpected(same.error());
+  if (Status same = same_frame("FrameOfReferenceUID (0020,0052)", seg->frame_of_reference, mri);
+      !same) {
+    return io::file_error(given.file, same.error());
   }
   if (!seg->names.empty() && seg->names.begin()->first < 1) {
     return invalid(given.file.string() +

@@ -6,6 +6,7 @@
 // DCMTK's own order.
 #include <dcmtk/dcmdata/dctk.h>
 
+#include <Eigen/Geometry>
 #include <array>
 #include <cmath>
 #include <string>
@@ -15,7 +16,7 @@
 
 namespace brainshift::io {
 
-// DCMTK prints to stderr and knows no compression until it is told.
+// DCMTK prints to stderr, knows no compression and leaves UN unread until it is told.
 void prepare_dcmtk();
 
 // kUnreadable: "NAME (gggg,eeee): what".
@@ -23,6 +24,9 @@ tl::unexpected<Error> wrong_tag(const char* tag, const std::string& what);
 
 // An element's text; empty where there is none.
 std::string text_of(DcmItem& item, const DcmTagKey& key);
+
+// The same in quotes, for a refusal.
+std::string said(DcmItem& item, const DcmTagKey& key);
 
 // Takes all of `numbers`; false unless as many are there and finite.
 template <std::size_t N>
@@ -35,12 +39,15 @@ bool take_numbers(DcmItem& item, const DcmTagKey& key, std::array<double, N>& nu
   return true;
 }
 
-// An image's plane, LPS, mm. The three items hold position, directions and spacings: one item for
-// classic images.
+// An image's plane, LPS, mm.
 struct ImagePlane {
   Vec3 position = Vec3::Zero(), along_row = Vec3::Zero(), along_column = Vec3::Zero();
   double between_columns = 0.0, between_rows = 0.0;
 };
+// Unit.
+Vec3 normal_of(const ImagePlane& plane);
+
+// The three items hold position, directions and spacings: one item for classic images.
 Result<ImagePlane> image_plane(DcmItem& position, DcmItem& orientation, DcmItem& spacing);
 
 // Expands compressed pixels, or says that they cannot be.

@@ -7,10 +7,12 @@
 #include <cmath>
 #include <fstream>
 #include <limits>
+#include <map>
 #include <string_view>
 
 #include "common/core/text.hpp"
 #include "common/io/dicom/dicom_access.hpp"
+#include "common/io/dicom/slice_places.hpp"
 #include "common/io/files/file_access.hpp"
 
 namespace brainshift::io {
@@ -18,7 +20,6 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr double kOffStep_mm = 0.05;
 constexpr Sint32 kMostFrames = 100000;
 constexpr int kMaxSegVoxelsAlong = 32767;
 
@@ -68,43 +69,73 @@ Result<Frame> read_frame(DcmDataset& data, Sint32 number) {
   return frame;
 }
 
-// Fills in the depths along the normal, from 0, and gives the step between slices.
-Result<double> slice_step_of(std::vector<Frame>& frames) {
+// Names the first frame that differs from frame 1 in what all slices of a volume share.
+Status check_parallel(const std::vector<Frame>& frames) {
   const ImagePlane& first = frames.front().plane;
-  const Vec3 normal = first.along_row.cross(first.along_column);
-  double lowest = std::numeric_limits<double>::infinity();
-  for (Frame& frame : frames) {
+  for (const Frame& frame : frames) {
     const ImagePlane& plane = frame.plane;
     const bool parallel = (plane.along_row - first.along_row).norm() < 1e-4 &&
-                          (plane.along_column - first.along_column).norm() < 1e-4 &&
-                          std::abs(plane.between_rows - first.between_rows) < 1e-4 &&
+                          (plane.along_column - first.along_column).norm() < 1e-4;
+    const bool spacings = std::abs(plane.between_rows - first.between_rows) < 1e-4 &&
                           std::abs(plane.between_columns - first.between_columns) < 1e-4;
-    const Vec3 away = plane.position - first.position;
-    frame.depth = away.dot(normal);
-    if (!parallel || (away - frame.depth * normal).norm() > kOffStep_mm) {
-      return unreadable(
-          "its frames are not slices of one volume: directions, spacings or places "
-          "differ");
-    }
-    lowest = std::min(lowest, frame.depth);
+    if (parallel && spacings) continue;
+    return unreadable(fmt::format(
+        "frames 1 and {} differ in {}: not slices of one volume", frame.number + 1,
+        !parallel ? "ImageOrientationPatient (0020,0037)" : "PixelSpacing (0028,0030)"));
   }
+  return {};
+}
+
+SlicePlace place_of(const Frame& frame) {
+  return {fmt::format("frame {}", frame.number + 1), frame.plane.position};
+}
+
+// Precondition: sorted by depth.
+Status check_one_frame_a_place(const std::vector<Frame>& frames) {
+  std::map<int, const Frame*> last;  // of each segment
+  for (const Frame& frame : frames) {
+    const Frame*& before = last[frame.segment];
+    if (before != nullptr && frame.depth - before->depth < kLargestSliceError_mm) {
+      return unreadable(fmt::format("{} and {} of segment {} lie at one place",
+                                    place_text(place_of(*before)), place_text(place_of(frame)),
+                                    frame.segment));
+    }
+    before = &frame;
+  }
+  return {};
+}
+
+// Fills in the depths along the normal, from 0, and gives the step between slices.
+Result<double> slice_step_of(std::vector<Frame>& frames) {
+  if (Status ok = check_parallel(frames); !ok) return tl::unexpected(ok.error());
+  const Vec3 normal = normal_of(frames.front().plane);
+  std::vector<SlicePlace> places;
+  for (const Frame& frame : frames) places.push_back(place_of(frame));
+  if (Status ok = check_slice_line(places, normal); !ok) return tl::unexpected(ok.error());
+  for (Frame& frame : frames) frame.depth = frame.plane.position.dot(normal);
+  std::stable_sort(frames.begin(), frames.end(),
+                   [](const Frame& a, const Frame& b) { return a.depth < b.depth; });
+  const double lowest = frames.front().depth;
   for (Frame& frame : frames) frame.depth -= lowest;
-  std::sort(frames.begin(), frames.end(),
-            [](const Frame& a, const Frame& b) { return a.depth < b.depth; });
+  if (Status ok = check_one_frame_a_place(frames); !ok) return tl::unexpected(ok.error());
   double step = frames.front().thickness;
-  if (!(step > 0.0)) {
+  const bool given = step > 0.0;
+  if (!given) {
     step = std::numeric_limits<double>::infinity();
     for (std::size_t f = 1; f < frames.size(); ++f) {
       const double apart = frames[f].depth - frames[f - 1].depth;
-      if (apart > kOffStep_mm) step = std::min(step, apart);
+      if (apart > kLargestSliceError_mm) step = std::min(step, apart);
     }
   }
   if (!std::isfinite(step)) return unreadable("says nowhere how thick its slices are");
   for (const Frame& frame : frames) {
-    if (std::abs(frame.depth - std::round(frame.depth / step) * step) > kOffStep_mm) {
+    if (std::abs(frame.depth - std::round(frame.depth / step) * step) > kLargestSliceError_mm) {
       return unreadable(fmt::format(
-          "a frame lies {:.3f} mm from the first, which is no multiple of the step {:.3f} mm",
-          frame.depth, step));
+          "{} lies {:.3f} mm from {}: no multiple of {}, {:.3f} mm", place_text(place_of(frame)),
+          frame.depth, place_text(place_of(frames.front())),
+          given ? "SpacingBetweenSlices (0018,0088) or SliceThickness (0018,0050)"
+                : "the smallest step between frames",
+          step));
     }
   }
   return step;
@@ -158,7 +189,7 @@ Result<Pixels> pixels_of(DcmDataset& data) {
 // Of frames in the order of their depths, `step` apart.
 Result<VoxelImage> grid_of(const std::vector<Frame>& sorted, double step, const Pixels& pixels) {
   const ImagePlane& first = sorted.front().plane;
-  const Vec3 normal = first.along_row.cross(first.along_column), to_ras(-1.0, -1.0, 1.0);
+  const Vec3 normal = normal_of(first), to_ras(-1.0, -1.0, 1.0);
   const double slices = std::round(sorted.back().depth / step) + 1.0;
   if (slices > kMaxSegVoxelsAlong) return unreadable(fmt::format("has {:.0f} slices", slices));
   VoxelImage grid;

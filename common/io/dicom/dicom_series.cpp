@@ -7,6 +7,7 @@
 #include <array>
 #include <cmath>
 #include <cstdint>
+#include <limits>
 #include <map>
 #include <memory>
 #include <vector>
@@ -14,6 +15,7 @@
 #include "common/core/text.hpp"
 #include "common/io/dicom/dicom_access.hpp"
 #include "common/io/dicom/dicom_segmentation.hpp"
+#include "common/io/dicom/slice_places.hpp"
 #include "common/io/files/file_access.hpp"
 
 namespace brainshift::io {
@@ -23,6 +25,8 @@ namespace fs = std::filesystem;
 
 constexpr double kSameDirection = 1e-4, kSameSpacing = 1e-4;
 constexpr int kMaxDicomVoxelsAlong = 32767;
+constexpr double kLargestStored = 65535.0;
+constexpr double kWidestStep = 1.5;  // of the usual one; a wider one is a gap
 
 struct Slice {
   fs::path file;
@@ -47,6 +51,30 @@ void take_values(const Stored* stored, std::size_t count, int bits, bool is_sign
   }
 }
 
+// Left as they are where the file has none.
+Status take_rescale(DcmDataset& data, double& slope, double& intercept) {
+  std::array<double, 1> number{};
+  if (data.tagExists(DCM_RescaleSlope)) {
+    if (!take_numbers(data, DCM_RescaleSlope, number) || number[0] == 0.0) {
+      return wrong_tag("RescaleSlope (0028,1053)",
+                       said(data, DCM_RescaleSlope) + ": must be finite and not 0");
+    }
+    slope = number[0];
+  }
+  if (data.tagExists(DCM_RescaleIntercept)) {
+    if (!take_numbers(data, DCM_RescaleIntercept, number)) {
+      return wrong_tag("RescaleIntercept (0028,1052)",
+                       said(data, DCM_RescaleIntercept) + ": must be finite");
+    }
+    intercept = number[0];
+  }
+  if (std::abs(slope) * kLargestStored + std::abs(intercept) > std::numeric_limits<float>::max()) {
+    return wrong_tag("RescaleSlope, RescaleIntercept (0028,1052-53)",
+                     fmt::format("{:g} and {:g}: values would be too large", slope, intercept));
+  }
+  return {};
+}
+
 Status take_pixels(DcmDataset& data, Slice& slice) {
   Uint16 columns = 0, rows = 0, samples = 1, allocated = 0, stored = 0, is_signed = 0;
   data.findAndGetUint16(DCM_Columns, columns);
@@ -67,14 +95,8 @@ Status take_pixels(DcmDataset& data, Slice& slice) {
         fmt::format("{} and {}: must be 8 or 16, and at most that", allocated, stored));
   }
   slice.size = {columns, rows};
-  std::array<double, 1> slope{1.0}, intercept{0.0};
-  if (data.tagExists(DCM_RescaleSlope) && !take_numbers(data, DCM_RescaleSlope, slope)) {
-    return wrong_tag("RescaleSlope (0028,1053)", "must be a number");
-  }
-  if (data.tagExists(DCM_RescaleIntercept) &&
-      !take_numbers(data, DCM_RescaleIntercept, intercept)) {
-    return wrong_tag("RescaleIntercept (0028,1052)", "must be a number");
-  }
+  double slope = 1.0, intercept = 0.0;
+  if (Status ok = take_rescale(data, slope, intercept); !ok) return ok;
   if (Status ok = expand_pixels(data); !ok) return ok;
   const auto count = static_cast<std::size_t>(columns) * rows;
   unsigned long there = 0;
@@ -90,9 +112,9 @@ Status take_pixels(DcmDataset& data, Slice& slice) {
                      fmt::format("has {} pixels: must be {} x {}", there, columns, rows));
   }
   if (bytes != nullptr) {
-    take_values(bytes, count, stored, is_signed != 0, slope[0], intercept[0], slice.values);
+    take_values(bytes, count, stored, is_signed != 0, slope, intercept, slice.values);
   } else {
-    take_values(words, count, stored, is_signed != 0, slope[0], intercept[0], slice.values);
+    take_values(words, count, stored, is_signed != 0, slope, intercept, slice.values);
   }
   return {};
 }
@@ -141,6 +163,13 @@ Status check_one_series(const std::vector<Slice>& slices) {
   }
   const Slice& first = slices.front();
   for (const Slice& slice : slices) {
+    if (slice.frame_of_reference != first.frame_of_reference) {
+      return unreadable(
+          fmt::format("{} and {} differ in FrameOfReferenceUID (0020,0052), {} and {}: not slices "
+                      "of one volume",
+                      first.file.filename().string(), slice.file.filename().string(),
+                      in_quotes(first.frame_of_reference), in_quotes(slice.frame_of_reference)));
+    }
     const bool directions =
         (slice.plane.along_row - first.plane.along_row).norm() < kSameDirection &&
         (slice.plane.along_column - first.plane.along_column).norm() < kSameDirection;
@@ -157,43 +186,65 @@ Status check_one_series(const std::vector<Slice>& slices) {
   return {};
 }
 
-// The step from slice to slice, LPS. Precondition: sorted along the normal.
-Result<Vec3> slice_step(const std::vector<Slice>& slices) {
-  const auto name = [&](std::size_t i) { return slices[i].file.filename().string(); };
-  if (slices.size() < 2) return unreadable("holds one image: must be a volume of several");
-  const Vec3 step = (slices.back().plane.position - slices.front().plane.position) /
-                    static_cast<double>(slices.size() - 1);
-  for (std::size_t i = 1; i < slices.size(); ++i) {
-    const double apart = (slices[i].plane.position - slices[i - 1].plane.position).norm();
-    if (apart < kLargestSliceError_mm) {
-      return unreadable(fmt::format("{} and {} lie at one place: several images of each slice",
-                                    name(i - 1), name(i)));
-    }
-  }
-  for (std::size_t i = 1; i < slices.size(); ++i) {
-    const Vec3 even = slices.front().plane.position + static_cast<double>(i) * step;
-    if ((slices[i].plane.position - even).norm() <= kLargestSliceError_mm) continue;
-    std::size_t widest = 1;
-    double gap = 0.0;
-    for (std::size_t k = 1; k < slices.size(); ++k) {
-      const double wide = (slices[k].plane.position - slices[k - 1].plane.position).norm();
-      if (wide > gap) gap = wide, widest = k;
-    }
+// What refuses slices whose distances differ. apart[i]: between slices i and i + 1, sorted.
+tl::unexpected<Error> uneven(const std::vector<SlicePlace>& places,
+                             const std::vector<double>& apart) {
+  std::vector<double> sorted = apart;
+  std::sort(sorted.begin(), sorted.end());
+  const double usual = sorted[(sorted.size() - 1) / 2];
+  const auto odd = std::max_element(apart.begin(), apart.end(), [&](double a, double b) {
+    return std::abs(a - usual) < std::abs(b - usual);
+  });
+  const auto at = static_cast<std::size_t>(odd - apart.begin());
+  const std::string from = place_text(places[at]), to = place_text(places[at + 1]);
+  if (*odd > kWidestStep * usual) {
     return unreadable(fmt::format(
-        "its {} images are not evenly spaced: {} and {} lie {:.3f} mm apart, the mean is "
-        "{:.3f} mm; is a file missing?",
-        slices.size(), name(widest - 1), name(widest), gap, step.norm()));
+        "a gap of {:.3f} mm between {} and {}, where {:.3f} mm are usual: is a file missing, or "
+        "one of another place there?",
+        *odd, from, to, usual));
   }
-  return step;
+  return unreadable(fmt::format(
+      "its {} images are not evenly spaced: {} and {} lie {:.3f} mm apart, where {:.3f} "
+      "mm are usual",
+      places.size(), from, to, *odd, usual));
+}
+
+// The step from slice to slice, along their normal, LPS. Precondition: sorted along it.
+Result<Vec3> slice_step(const std::vector<Slice>& slices, const Vec3& normal) {
+  if (slices.size() < 2) return unreadable("holds one image: must be a volume of several");
+  std::vector<SlicePlace> places;
+  for (const Slice& slice : slices) {
+    places.push_back({slice.file.filename().string(), slice.plane.position});
+  }
+  std::vector<double> apart;
+  for (std::size_t i = 1; i < places.size(); ++i) {
+    const Vec3 step = places[i].position - places[i - 1].position;
+    if (step.norm() < kLargestSliceError_mm) {
+      return unreadable(fmt::format("{} and {} lie at one place: several images of each slice",
+                                    place_text(places[i - 1]), place_text(places[i])));
+    }
+    apart.push_back(step.dot(normal));
+  }
+  if (Status ok = check_slice_line(places, normal); !ok) return tl::unexpected(ok.error());
+  const Vec3 all = places.back().position - places.front().position;
+  const double step = all.dot(normal) / static_cast<double>(apart.size());
+  double depth = 0.0;
+  for (std::size_t i = 0; i < apart.size(); ++i) {
+    depth += apart[i];
+    if (std::abs(depth - static_cast<double>(i + 1) * step) > kLargestSliceError_mm) {
+      return uneven(places, apart);
+    }
+  }
+  return Vec3(step * normal);
 }
 
 Result<DicomSeries> join(std::vector<Slice>& slices) {
   if (Status ok = check_one_series(slices); !ok) return tl::unexpected(ok.error());
-  const Vec3 normal = slices.front().plane.along_row.cross(slices.front().plane.along_column);
+  const Vec3 normal = normal_of(slices.front().plane);
   std::sort(slices.begin(), slices.end(), [&](const Slice& a, const Slice& b) {
     return a.plane.position.dot(normal) < b.plane.position.dot(normal);
   });
-  const auto step = slice_step(slices);
+  const auto step = slice_step(slices, normal);
   if (!step) return tl::unexpected(step.error());
   const Slice& first = slices.front();
   DicomSeries series;

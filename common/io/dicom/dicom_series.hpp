@@ -3,10 +3,11 @@
 //
 // With the first image's position P, its directions r (of a row) and c (of a column) and the pixel
 // spacings d_r (between rows) and d_c:
-//   x_lps = P + i d_c r + j d_r c + k s,   s = (P_last - P) / (number - 1)
-// in the order of the positions along r x c, never of file names or instance numbers; RAS = (-x,
-// -y, z). Values are slope x stored + intercept, image by image. Uncompressed files, and those
-// that DCMTK expands: RLE, JPEG (lossless too) and JPEG-LS.
+//   x_lps = P + i d_c r + j d_r c + k s n,   n = r x c,   s = n . (P_last - P) / (number - 1)
+// in the order of the positions along n, never of file names or instance numbers; RAS = (-x, -y,
+// z). Every image lies within kLargestSliceError_mm of where this puts it. Values are slope x
+// stored + intercept, image by image. Uncompressed files, and those that DCMTK expands: RLE, JPEG
+// (lossless too) and JPEG-LS.
 // Source: DICOM PS3.3, C.7.6.2 (image plane), C.7.6.3 (pixels), C.11.1 (modality LUT).
 #pragma once
 
@@ -26,13 +27,11 @@ struct DicomSeries {
   int other_files = 0;           // of the folder: no DICOM, or DICOM without an image
 };
 
-// How far an image's position may lie from the even steps of the others, mm.
-inline constexpr double kLargestSliceError_mm = 0.05;
-
 // kNotFound: no such folder. kUnreadable naming folder or file: no image, images of several series
 // (listed), a damaged file, several frames or colours in one, a tag that is missing or wrong,
-// directions, spacings or sizes that differ, two images of one place, a gap, a compression that
-// cannot be expanded.
+// frames of reference, directions, spacings or sizes that differ, two images of one place, images
+// that are tilted or lie beside each other (slice_places.hpp), a gap, a compression that cannot be
+// expanded.
 Result<DicomSeries> read_dicom_series(const std::filesystem::path& folder);
 
 }  // namespace brainshift::io

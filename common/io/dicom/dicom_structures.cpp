@@ -5,7 +5,9 @@
 
 #include <algorithm>
 #include <cmath>
+#include <map>
 #include <string_view>
+#include <utility>
 
 #include "common/core/text.hpp"
 #include "common/io/dicom/dicom_access.hpp"
@@ -84,12 +86,40 @@ Status read_contours(DcmItem& of_structure, DicomStructure& structure) {
   return {};
 }
 
-// The first of the series that it was drawn on.
-std::string referenced_series(DcmItem& frame) {
-  DcmItem* const study = contour_item(frame, DCM_RTReferencedStudySequence, 0);
-  DcmItem* const series =
-      study != nullptr ? contour_item(*study, DCM_RTReferencedSeriesSequence, 0) : nullptr;
-  return series != nullptr ? text_of(*series, DCM_SeriesInstanceUID) : std::string();
+// Series by the frame of reference that they share: what the structures were drawn on.
+using ReferencedFrames = std::map<std::string, std::vector<std::string>>;
+
+ReferencedFrames referenced_frames(DcmDataset& data) {
+  ReferencedFrames frames;
+  for (Sint32 f = 0;
+       DcmItem* const frame = contour_item(data, DCM_ReferencedFrameOfReferenceSequence, f); ++f) {
+    auto& uids = frames[text_of(*frame, DCM_FrameOfReferenceUID)];
+    for (Sint32 i = 0;
+         DcmItem* const study = contour_item(*frame, DCM_RTReferencedStudySequence, i); ++i) {
+      for (Sint32 k = 0;
+           DcmItem* const series = contour_item(*study, DCM_RTReferencedSeriesSequence, k); ++k) {
+        uids.push_back(text_of(*series, DCM_SeriesInstanceUID));
+      }
+    }
+  }
+  return frames;
+}
+
+// A structure's own, or the only one of the file where it says none.
+Status take_frame(DcmItem& item, const ReferencedFrames& frames, DicomStructure& structure) {
+  structure.frame_of_reference = text_of(item, DCM_ReferencedFrameOfReferenceUID);
+  if (structure.frame_of_reference.empty() && frames.size() > 1) {
+    return wrong_tag("ReferencedFrameOfReferenceUID (3006,0024)",
+                     fmt::format("structure {} {} has none, and the file names {} frames of "
+                                 "reference: which one it was drawn in cannot be told",
+                                 structure.number, in_quotes(structure.name), frames.size()));
+  }
+  if (structure.frame_of_reference.empty() && frames.size() == 1) {
+    structure.frame_of_reference = frames.begin()->first;
+  }
+  const auto frame = frames.find(structure.frame_of_reference);
+  if (frame != frames.end()) structure.series = frame->second;
+  return {};
 }
 
 Result<DicomStructures> parse_structures(DcmDataset& data) {
@@ -97,10 +127,7 @@ Result<DicomStructures> parse_structures(DcmDataset& data) {
     return unreadable("is DICOM, but no structure set (RTSTRUCT)");
   }
   DicomStructures result;
-  if (DcmItem* const frame = contour_item(data, DCM_ReferencedFrameOfReferenceSequence, 0)) {
-    result.frame_of_reference = text_of(*frame, DCM_FrameOfReferenceUID);
-    result.series = referenced_series(*frame);
-  }
+  const ReferencedFrames frames = referenced_frames(data);
   const auto find = [&](int number) {
     return std::find_if(result.structures.begin(), result.structures.end(),
                         [&](const DicomStructure& one) { return one.number == number; });
@@ -115,11 +142,10 @@ Result<DicomStructures> parse_structures(DcmDataset& data) {
                        fmt::format("{} stands for {} and {}", *number,
                                    in_quotes(find(*number)->name), in_quotes(name)));
     }
-    if (const std::string frame = text_of(*item, DCM_ReferencedFrameOfReferenceUID);
-        result.frame_of_reference.empty()) {
-      result.frame_of_reference = frame;
-    }
-    result.structures.push_back({*number, name, {}, {}});
+    DicomStructure structure;
+    structure.number = *number, structure.name = name;
+    if (Status ok = take_frame(*item, frames, structure); !ok) return tl::unexpected(ok.error());
+    result.structures.push_back(std::move(structure));
   }
   for (Sint32 s = 0; DcmItem* const item = contour_item(data, DCM_ROIContourSequence, s); ++s) {
     const auto number =

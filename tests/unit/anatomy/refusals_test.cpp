@@ -2,6 +2,7 @@
 // Every invalid case is rejected with one line that names the key and the value.
 #include <gmock/gmock.h>
 
+#include <cmath>
 #include <limits>
 #include <string>
 #include <vector>
@@ -126,6 +127,27 @@ TEST(Refusals, ALabelTooSmallForASurface) {
   inputs.tumour_labels->values[364] = 1.0f;  // one voxel, smoothed away
   expect_refused(inputs, ErrorCode::kEmptySet,
                  {"tumour.label_volume.file = 'labels.nii'", "too small"});
+}
+
+// Smoothed, it is left in pieces of less than a twentieth of it.
+TEST(Refusals, ARingTooThinForASurface) {
+  CaseInputs inputs = box_case();
+  inputs.config.tumour = TumourLabel{"labels.nii", {1}};
+  inputs.tumour_labels = geometry::balls::empty_image(48, kBallCentre, Mat3::Identity());
+  std::size_t v = 0;
+  for (float& value : inputs.tumour_labels->values) {
+    const auto voxel = static_cast<double>(v % 48), row = static_cast<double>(v / 48 % 48);
+    const auto slice = static_cast<double>(v / (48 * 48));
+    const double from_axis = std::hypot(voxel - 23.5, row - 23.5);
+    const bool in = std::abs(from_axis - 17.8) < 0.8 && std::abs(slice - 23.5) < 6.0;
+    value = in ? 1.0F : 0.0F;
+    ++v;
+  }
+  ::testing::internal::CaptureStderr();
+  expect_refused(inputs, ErrorCode::kEmptySet,
+                 {"tumour.label_volume.file = 'labels.nii'", "too thin",
+                  "nowhere thicker than 2.0 mm, and smoothing by 1.0 mm"});
+  EXPECT_EQ(::testing::internal::GetCapturedStderr(), "");
 }
 
 TEST(Refusals, ATumourSurfaceThatIsNotClosedOrNotWhole) {

@@ -1,9 +1,11 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// How a tumour is fitted into the brain. Its making is tested in brain_model_builder_test.cpp.
+// How a tumour is fitted into the brain, and the making of a hollow one. More of the making is
+// tested in brain_model_builder_test.cpp.
 #include "common/anatomy/brain_mesh.hpp"
 
 #include <gmock/gmock.h>
 
+#include <cmath>
 #include <limits>
 #include <numbers>
 
@@ -11,6 +13,7 @@
 #include "common/geometry/tet_locator.hpp"
 #include "tests/support/box_mesh.hpp"
 #include "tests/support/results.hpp"
+#include "tests/unit/geometry/ball_mask.hpp"
 
 namespace brainshift::anatomy {
 namespace {
@@ -29,6 +32,23 @@ const TetMesh& box() {
 TriangleSurface ball(double out_mm) {
   return geometry::ellipsoid_surface(Vec3(40.0 - kRadius_mm + out_mm, 3, -2),
                                      Vec3::Constant(kRadius_mm), 0.8);
+}
+
+// A wall of 2.1 mm round a hollow, as enhancement round a necrosis has.
+TEST(TumourSurface, AHollowTumourHasBothOfItsWallsAndCgalPrintsNothing) {
+  CaseInputs inputs;
+  inputs.config.tumour = TumourLabel{"labels.nii", {1}};
+  inputs.tumour_labels = geometry::balls::paint_balls(
+      geometry::balls::empty_image(36, Vec3::Zero(), Mat3::Identity()), {{Vec3::Zero(), 10.8}},
+      [](double depth) { return std::abs(depth) < 1.05 ? 1.0F : 0.0F; });
+  ::testing::internal::CaptureStderr();
+  const auto surface = value_or_fail(make_tumour_surface(inputs, nullptr));
+  EXPECT_EQ(::testing::internal::GetCapturedStderr(), "");
+  EXPECT_TRUE(geometry::is_closed(surface));
+  EXPECT_NEAR(geometry::enclosed_volume(surface), 3100.0, 300.0);
+  const VecX radii = surface.vertices.colwise().norm();
+  EXPECT_NEAR(radii.minCoeff(), 9.7, 0.6);
+  EXPECT_NEAR(radii.maxCoeff(), 11.9, 0.6);
 }
 
 TEST(FitTumour, ATumourInsideStaysAsItIs) {

@@ -62,7 +62,8 @@ inline std::string file_head() {
 // A segmentation of "Tumour" (1) and "Oedema" (2).
 struct FrameOf {
   int segment = 1;
-  std::string place;  // along S, mm
+  std::string place;             // along S, mm
+  std::string beside = "-5\\7";  // across it, mm
 };
 
 // Axial frames of 3 columns and 5 rows, 15 bits each: the bits of a frame begin inside a byte.
@@ -96,7 +97,7 @@ struct Segmentation {
     std::vector<std::string> own;
     for (const FrameOf& frame : frames) {
       std::string place, segment, &item = own.emplace_back();
-      put_element(place, {0x0020, 0x0032}, "DS", even("-5\\7\\" + frame.place));
+      put_element(place, {0x0020, 0x0032}, "DS", even(frame.beside + "\\" + frame.place));
       put_element(segment, {0x0062, 0x000b}, "US", us(static_cast<std::uint16_t>(frame.segment)));
       put_sequence(item, {0x0020, 0x9113}, {place});
       put_sequence(item, {0x0062, 0x000a}, {segment});

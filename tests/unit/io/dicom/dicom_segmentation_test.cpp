@@ -52,9 +52,20 @@ TEST_F(DicomSegmentationOf, FractionsCountFromHalfOn) {
 TEST_F(DicomSegmentationOf, WhatIsWrongIsNamed) {
   Segmentation of;
   of.set(0, 0).frames[1].place = "11.1";
-  EXPECT_THAT(refusal(of), HasSubstr("no multiple of the step 2.000 mm"));
+  EXPECT_THAT(refusal(of),
+              HasSubstr("frame 2 at (-5, 7, 11.1) lies 1.100 mm from frame 3 at "
+                        "(-5, 7, 10): no multiple of SpacingBetweenSlices (0018,0088) or "
+                        "SliceThickness (0018,0050), 2.000 mm"));
   of.frames[1] = {3, "10"};
   EXPECT_THAT(refusal(of), HasSubstr("frame 2 is of segment 3, which is not listed"));
+  of.frames[1] = {2, "10"};
+  EXPECT_THAT(refusal(of), HasSubstr("frame 2 at (-5, 7, 10) and frame 3 at (-5, 7, 10) of segment "
+                                     "2 lie at one place"));
+  of.frames[1] = {1, "12", "-5\\307"};
+  EXPECT_THAT(refusal(of), HasSubstr("frame 2 at (-5, 307, 12) lies 300.00 mm beside the others"));
+  of.frames[0].beside = "-5\\9", of.frames[1].beside = "-5\\8";
+  EXPECT_THAT(refusal(of), HasSubstr("tilted by 26.6 degrees"));
+  of.frames[0].beside = "-5\\7";
   of.frames[1] = {1, "x"};
   EXPECT_THAT(refusal(of), HasSubstr("(0020,0032)"));
   of.frames[1] = {1, "10"};

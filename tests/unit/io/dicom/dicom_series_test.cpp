@@ -99,18 +99,37 @@ TEST_F(DicomSeriesOf, ValuesAreSignedAndScaledAsTheTagsSay) {
 }
 
 TEST_F(DicomSeriesOf, WhatIsNoVolumeIsRefusedByName) {
-  add("b.dcm", Image("-28"));
-  EXPECT_THAT(refusal(),
-              AllOf(HasSubstr("b.dcm"), HasSubstr("8.000 mm apart"), HasSubstr("missing")));
-  add("b.dcm", Image("-20"));
-  EXPECT_THAT(refusal(), HasSubstr("lie at one place"));
   add("b.dcm", Image("-24").set({0x0020, 0x000e}, "UI", even("1.2.4", '\0')));
   EXPECT_THAT(refusal(),
               AllOf(HasSubstr("several series"), HasSubstr("\"T1 sagittal\" of 2 images")));
+  add("b.dcm", Image("-24").set({0x0020, 0x0052}, "UI", even("1.2.5", '\0')));
+  EXPECT_THAT(refusal(),
+              HasSubstr("a.dcm and b.dcm differ in FrameOfReferenceUID (0020,0052), \"\" "
+                        "and \"1.2.5\""));
   add("b.dcm", Image("-24").set({0x0028, 0x0030}, "DS", even("2\\0.6")));
   EXPECT_THAT(refusal(), HasSubstr("differ in pixel spacing"));
   add("b.dcm", Image("-24").set({0x0020, 0x0037}, "DS", even("1\\0\\0\\0\\1\\0")));
   EXPECT_THAT(refusal(), HasSubstr("differ in direction"));
+}
+
+TEST_F(DicomSeriesOf, PlacesOfNoVolumeAreCalledWhatTheyAre) {
+  const auto at = [](const std::string& x, const std::string& y) {
+    return Image(x).set({0x0020, 0x0032}, "DS", even(x + "\\" + y + "\\50"));
+  };
+  add("b.dcm", Image("-324"));
+  EXPECT_THAT(refusal(), HasSubstr("a gap of 304.000 mm between c.dcm at (-20, -100, 50) and b.dcm "
+                                   "at (-324, -100, 50), where 4.000 mm are usual: is a file "
+                                   "missing"));
+  add("b.dcm", Image("-25"));
+  EXPECT_THAT(refusal(), HasSubstr("not evenly spaced: c.dcm at (-20, -100, 50) and b.dcm at (-25, "
+                                   "-100, 50) lie 5.000 mm apart, where 4.000 mm are usual"));
+  add("b.dcm", Image("-20"));
+  EXPECT_THAT(refusal(), AllOf(HasSubstr("b.dcm at (-20, -100, 50)"), HasSubstr("c.dcm at (-20, "),
+                               HasSubstr("lie at one place")));
+  add("b.dcm", at("-24", "200"));
+  EXPECT_THAT(refusal(), HasSubstr("b.dcm at (-24, 200, 50) lies 300.00 mm beside the others"));
+  add("c.dcm", at("-20", "-101")), add("b.dcm", at("-24", "-102"));
+  EXPECT_THAT(refusal(), HasSubstr("tilted by 14 degrees"));
 }
 
 TEST_F(DicomSeriesOf, AWrongTagIsNamedWithItsFile) {
@@ -122,6 +141,11 @@ TEST_F(DicomSeriesOf, AWrongTagIsNamedWithItsFile) {
               AllOf(HasSubstr("b.dcm"), HasSubstr("(0020,0032)")));
   EXPECT_THAT(with({0x0020, 0x0037}, "DS", even("0\\2\\0\\0\\0\\-1")), HasSubstr("(0020,0037)"));
   EXPECT_THAT(with({0x0028, 0x0030}, "DS", "0\\1 "), HasSubstr("(0028,0030)"));
+  for (const std::string slope : {"0", "nan", "1e999"}) {
+    EXPECT_THAT(with({0x0028, 0x1053}, "DS", even(slope)),
+                HasSubstr("b.dcm: RescaleSlope (0028,1053): \"" + slope + "\": must be finite"));
+  }
+  EXPECT_THAT(with({0x0028, 0x1053}, "DS", even("1e300")), HasSubstr("would be too large"));
   EXPECT_THAT(with({0x0028, 0x0008}, "IS", "12"), HasSubstr("enhanced"));
   EXPECT_THAT(with({0x0028, 0x0002}, "US", us(3)), HasSubstr("colour"));
   EXPECT_THAT(with({0x0028, 0x0010}, "US", us(9)), HasSubstr("has 6 pixels"));

@@ -3,6 +3,8 @@
 
 #include <gmock/gmock.h>
 
+#include <cmath>
+
 #include "tests/support/dicom_files.hpp"
 #include "tests/support/results.hpp"
 #include "tests/support/temporary_folder.hpp"
@@ -16,6 +18,7 @@ using test_support::DrawnStructure;
 using test_support::StructureSet;
 using test_support::TemporaryFolder;
 using testing::AllOf;
+using testing::ElementsAre;
 using testing::HasSubstr;
 
 class DicomStructuresOf : public testing::Test {
@@ -48,8 +51,36 @@ TEST_F(DicomStructuresOf, ContoursAreWhereTheFileSaysInRas) {
   ASSERT_EQ(gtv.contours.size(), 2u);
   EXPECT_LT((gtv.contours[1] - set.structures[0].contours[1].points).norm(), 1e-9);
   EXPECT_EQ(read_set.structures[1].defect, "has no contour");
-  EXPECT_EQ(read_set.frame_of_reference, "1.2.3.4");
-  EXPECT_EQ(read_set.series, "1.2.3");
+  EXPECT_EQ(gtv.frame_of_reference, "1.2.3.4");
+  EXPECT_THAT(gtv.series, ElementsAre("1.2.3"));
+}
+
+TEST_F(DicomStructuresOf, EachStructureLiesInItsOwnFrameOfReference) {
+  set.other_frame = "1.2.3.7";
+  set.structures[1].frame_of_reference = "1.2.3.7";
+  const auto structures = read().structures;
+  EXPECT_EQ(structures[0].frame_of_reference, "1.2.3.4");
+  EXPECT_THAT(structures[0].series, ElementsAre("1.2.3"));
+  EXPECT_EQ(structures[1].frame_of_reference, "1.2.3.7");
+  EXPECT_THAT(structures[1].series, ElementsAre("1.2.88"));
+  set.structures[1].frame_of_reference = " ";
+  EXPECT_THAT(refusal(), AllOf(HasSubstr("(3006,0024): structure 3 \"Isocentre\" has none"),
+                               HasSubstr("names 2 frames of reference")));
+}
+
+// DS, their type, has a length of 16 bits in the file: longer ones are written as UN.
+TEST_F(DicomStructuresOf, ContoursLongerThan64KiBAreReadWhole) {
+  Points& points = set.structures[0].contours[0].points;
+  points.resize(3, 4000);
+  for (Eigen::Index i = 0; i < points.cols(); ++i) {
+    const double angle = 0.001 * static_cast<double>(i);
+    points.col(i) = Vec3(40.0 * std::cos(angle), 30.0 * std::sin(angle), 4.0);
+  }
+  const Points read_points = read().structures[0].contours[0];
+  EXPECT_THAT(test_support::content_of(folder / "rs.dcm"),
+              HasSubstr(std::string("\x06\x30\x50\x00UN", 6)));
+  ASSERT_EQ(read_points.cols(), 4000);
+  EXPECT_LT((read_points - points).cwiseAbs().maxCoeff(), 1e-6);
 }
 
 TEST_F(DicomStructuresOf, ARepeatedEndIsOnePointAndXorIsAContour) {

@@ -187,6 +187,17 @@ TEST_F(RegisterUltrasound, AProbeThatIsHeldStillShowsTooLittle) {
                                HasSubstr("sweep or tilt the probe")));
 }
 
+TEST_F(RegisterUltrasound, TwoFramesThatCrossAreTooFew) {
+  SequenceContent content = VirtualProbe().content();
+  const auto bytes = static_cast<std::size_t>(kPixels) * kPixels;
+  content.frames = {content.frames.front(), content.frames.back()};
+  content.pixels =
+      content.pixels.substr(0, bytes) + content.pixels.substr(content.pixels.size() - bytes);
+  record(content);
+  EXPECT_THAT(refusal(), HasSubstr("us.mha: has too few frames: 2 of 2 have a valid chain and a "
+                                   "place of their own, 8 are needed"));
+}
+
 TEST_F(RegisterUltrasound, WhatTheMriDoesNotHaveIsRefused) {
   for (const std::uint64_t other : {99U, 98U, 97U}) {
     VirtualProbe probe;

@@ -275,8 +275,11 @@ TEST_F(FirstCase, AStructureSetOfAnotherFrameOfReferenceIsRefused) {
   set.structures = {{1, "GTV", test_support::outlines(drawn(lesion_at), 1)}};
   set.frame_of_reference = "1.2.3.5";
   test_support::write_structure_set(options.tumour, set);
-  EXPECT_THAT(refusal(), HasSubstr("rs.dcm: was drawn in another frame of reference"));
-  set.frame_of_reference = "1.2.3.4", set.series = "1.2.77";
+  EXPECT_THAT(refusal(),
+              AllOf(HasSubstr("rs.dcm: structure 1 \"GTV\": was drawn in another frame of "
+                              "reference"),
+                    HasSubstr("(3006,0024) is \"1.2.3.5\", --mri has \"1.2.3.4\"")));
+  set.frame_of_reference = "1.2.3.4", set.series = "1.2.77", set.other_frame = "1.2.3.5";
   test_support::write_structure_set(options.tumour, set);
   written();
   EXPECT_THAT(test_support::content_of(options.out),
