@@ -318,7 +318,7 @@ def publish(rows, record, folder, commit):
     write_file(folder / "musts.md", musts_text(record))
     write_file(folder / "summary.md", summary_text(rows, commit))
     drawn = draw_reliability(rows, folder)
-    write_file(folder / "reliability.md",
+    write_file(folder / "reliability.txt",
                f"![How often truths from outside lie in the intervals]({folder.parent.name}/{folder.name}/outside-reliability.png)\n"
                if drawn else "Reliability curves are not drawn: these rows have the 90 % interval alone.\n")
 

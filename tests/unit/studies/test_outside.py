@@ -207,7 +207,7 @@ def test_reliability_is_drawn_where_the_rows_have_all_intervals(tmp_path, rows):
     more = {f"{part}_coverage_{one}": one / 100 for part in ("near", "far") for one in outside.INTERVALS}
     outside.publish(table_of(every(rows, **more)), Record(None), tmp_path, "abc")
     assert (tmp_path / "outside-reliability.png").stat().st_size > 5000
-    assert f"/{tmp_path.name}/outside-reliability.png)" in (tmp_path / "reliability.md").read_text()
+    assert f"/{tmp_path.name}/outside-reliability.png)" in (tmp_path / "reliability.txt").read_text()
 
 
 def test_rows_of_own_truths_alone_are_bad_input(tmp_path, rows):

@@ -9,7 +9,7 @@ from studies import surgeries
 from studies.rows import Table
 
 FOLDER = DOCS / "surgeries"
-TABLES = sorted(FOLDER.glob("rows-*.csv"))
+TABLES = sorted(FOLDER.glob("rows-*.csv.gz"))
 BEFORE = sorted((FOLDER / "before").glob("rows-*.csv"))
 
 
