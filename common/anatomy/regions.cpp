@@ -135,8 +135,33 @@ Status check_sides(const VoxelImage& map, const std::string& what) {
       what, sum[0] / count[0], sum[1] / count[1]));
 }
 
-Status check_map(const VoxelImage& map, const AnatomyConfig& wanted, const std::string& what,
+// The voxels of an image at whose values `is` holds, as points of the head.
+template <typename Is, typename See>
+void for_each_voxel(const VoxelImage& image, const Is& is, const See& see) {
+  std::size_t v = 0;
+  for (int k = 0; k < image.dims[2]; ++k)
+    for (int j = 0; j < image.dims[1]; ++j)
+      for (int i = 0; i < image.dims[0]; ++i, ++v) {
+        if (is(image.values[v])) see(v, Vec3(image.T_ras_voxel * Vec3(i, j, k)));
+      }
+}
+
+// Whether a point of the head lies in a voxel > 0.
+auto inside_mask(const VoxelImage& brain) {
+  return [&brain, T_voxel_ras = AffineTransform(brain.T_ras_voxel.inverse())](const Vec3& x) {
+    const Vec3 place = T_voxel_ras * x;
+    std::array<int, 3> at{};
+    for (std::size_t a = 0; a < 3; ++a) {
+      at[a] = static_cast<int>(std::lround(place[static_cast<Eigen::Index>(a)]));
+      if (at[a] < 0 || at[a] >= brain.dims[a]) return false;
+    }
+    return brain.at(at[0], at[1], at[2]) > 0.0F;
+  };
+}
+
+Status check_map(const VoxelImage& map, const CaseInputs& inputs, const std::string& what,
                  Notes* notes) {
+  const AnatomyConfig& wanted = inputs.config.anatomy;
   std::set<int> labels;
   for (const float v : map.values) labels.insert(whole(v));
   const auto has = [&](auto&& is) { return std::any_of(labels.begin(), labels.end(), is); };
@@ -167,10 +192,19 @@ Status check_map(const VoxelImage& map, const AnatomyConfig& wanted, const std::
   if (!strange.empty()) {
     VoxelImage others = map;
     for (float& v : others.values) v = strange.count(whole(v)) != 0 ? v : 0.0F;
-    add_note(notes,
-             fmt::format("{}: not of the brain by anatomy.numbers = {}: {}; where the brain "
-                         "is, the nearest part takes their place",
-                         what, word_of(wanted.numbers, kNumbersWords), listed_labels(others)));
+    // Skull and scalp are no part of the brain, and not missed.
+    if (inputs.brain) {
+      for_each_voxel(
+          others, [](float v) { return v != 0.0F; },
+          [&, in_mask = inside_mask(*inputs.brain)](std::size_t v, const Vec3& x) {
+            if (!in_mask(x)) others.values[v] = 0.0F;
+          });
+    }
+    if (listed_labels(others) != "none")
+      add_note(notes,
+               fmt::format("{}: not of the brain by anatomy.numbers = {}: {}; where the brain "
+                           "is, the nearest part takes their place",
+                           what, word_of(wanted.numbers, kNumbersWords), listed_labels(others)));
   }
   const std::pair<bool, std::pair<Structure, const char*>> absent[] = {
       {wanted.septa || wanted.tissues, {Structure::kCerebellum, "cerebellum"}},
@@ -183,17 +217,6 @@ Status check_map(const VoxelImage& map, const AnatomyConfig& wanted, const std::
     }
   }
   return {};
-}
-
-// The voxels of an image at whose values `is` holds, as points of the head.
-template <typename Is, typename See>
-void for_each_voxel(const VoxelImage& image, const Is& is, const See& see) {
-  std::size_t v = 0;
-  for (int k = 0; k < image.dims[2]; ++k)
-    for (int j = 0; j < image.dims[1]; ++j)
-      for (int i = 0; i < image.dims[0]; ++i, ++v) {
-        if (is(image.values[v])) see(v, Vec3(image.T_ras_voxel * Vec3(i, j, k)));
-      }
 }
 
 bool is_brain(float value) {
@@ -229,16 +252,7 @@ class Neighbourhood {
 Status check_fit(const VoxelImage& map, const CaseInputs& inputs, const std::string& what) {
   if (!inputs.brain) return {};  // the mesher tells
   const VoxelImage& brain = *inputs.brain;
-  const AffineTransform T_voxel_ras = brain.T_ras_voxel.inverse();
-  const auto in_mask = [&](const Vec3& x) {
-    const Vec3 place = T_voxel_ras * x;
-    std::array<int, 3> at{};
-    for (std::size_t a = 0; a < 3; ++a) {
-      at[a] = static_cast<int>(std::lround(place[static_cast<Eigen::Index>(a)]));
-      if (at[a] < 0 || at[a] >= brain.dims[a]) return false;
-    }
-    return brain.at(at[0], at[1], at[2]) > 0.0F;
-  };
+  const auto in_mask = inside_mask(brain);
   Neighbourhood labelled;
   double labels = 0.0, outside = 0.0;
   for_each_voxel(map, is_brain, [&](std::size_t, const Vec3& x) {
@@ -293,7 +307,7 @@ Status keep_tumour(std::vector<std::uint8_t>& regions, const VoxelImage& map,
     ++taken;
   });
   const double mm3 = static_cast<double>(taken) * std::abs(map.T_ras_voxel.linear().determinant());
-  if (taken > 0) {
+  if (mm3 >= 10.0) {
     add_note(notes, fmt::format("{}: {:.2f} cc of the tumour lie in ventricles; they are tissue",
                                 what, mm3 / 1e3));
   }
@@ -323,7 +337,7 @@ Result<Regions> Regions::build_from(const CaseInputs& inputs, const VoxelImage& 
                                     const TriangleSurface& tumour, double smoothing_mm,
                                     const std::string& what, Notes* notes) {
   const AnatomyConfig& wanted = inputs.config.anatomy;
-  if (Status status = check_map(map, wanted, what, notes); !status) {
+  if (Status status = check_map(map, inputs, what, notes); !status) {
     return tl::unexpected(status.error());
   }
   if (Status fits = check_fit(map, inputs, what); !fits) return tl::unexpected(fits.error());

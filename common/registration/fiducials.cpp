@@ -145,7 +145,7 @@ std::string what_explains(const Points& measured, const FiducialRegistration& fo
   const std::string mirrored = geometry::likely_mistake(
       image, [&](const Points& meant) { return explains(fit(measured, meant).fre_mm); });
   if (exchanged.empty() || mirrored.empty()) return exchanged + mirrored;
-  return exchanged + " or" + mirrored.substr(1);
+  return exchanged.substr(0, exchanged.size() - 1) + ", or" + mirrored.substr(1);
 }
 
 // Depth-first over assignments. A branch ends where a distance to a fiducial that is already
@@ -266,9 +266,47 @@ Result<FiducialRegistration> match_fiducials(const Points& measured, const Point
   return *matcher.best();
 }
 
+namespace {
+
+// What a name says of the place of its fiducial along `axis`: +1 or -1, 0: nothing.
+int side_told(std::string name, Eigen::Index axis) {
+  std::transform(name.begin(), name.end(), name.begin(),
+                 [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
+  const auto has = [&name](const char* word) { return name.find(word) != std::string::npos; };
+  if (axis == 0) return has("left") == has("right") ? 0 : has("right") ? 1 : -1;
+  const bool front = has("nasion") || has("nose") || has("glabella");
+  const bool back = has("inion") || has("occiput");
+  return front == back ? 0 : front ? 1 : -1;
+}
+
+// Half a turn about an axis, LPS for RAS, leaves distances as they are; names tell it.
+Status check_named_sides(const Points& image, const std::vector<std::string>& names) {
+  for (const Eigen::Index axis : {0, 1}) {
+    for (Eigen::Index i = 0; i < image.cols(); ++i) {
+      for (Eigen::Index j = 0; j < image.cols(); ++j) {
+        const auto &more = names[static_cast<std::size_t>(i)],
+                   &less = names[static_cast<std::size_t>(j)];
+        if (side_told(more, axis) != 1 || side_told(less, axis) != -1) continue;
+        if (image(axis, i) > image(axis, j)) continue;
+        return invalid(fmt::format(
+            "fiducials: in the image '{}' ({}{:.0f} mm) lies {} '{}' ({}{:.0f} mm): coordinates in "
+            "LPS? (a heading name,l,p,s says so)",
+            more, axis == 0 ? "R " : "A ", image(axis, i), axis == 0 ? "left of" : "behind", less,
+            axis == 0 ? "R " : "A ", image(axis, j)));
+      }
+    }
+  }
+  return {};
+}
+
+}  // namespace
+
 Status check_head_fit(const Points& measured, const FiducialRegistration& fit,
                       const std::vector<std::string>& names) {
   if (Status good = check_span(fit.image); !good) return good;
+  if (static_cast<Eigen::Index>(names.size()) == fit.image.cols()) {
+    if (Status sides = check_named_sides(fit.image, names); !sides) return sides;
+  }
   const bool too_large = !(fit.fre_mm <= kLargestFre_mm);
   const bool told = fit.image.cols() >= kTold && fit.fre_mm > kExplainable_mm;
   if (!too_large && !told) return {};

@@ -69,8 +69,9 @@ inline constexpr double kPoorFre_mm = 5.0, kLargestFre_mm = 10.0;
 // fiducials, or empty.
 // kInvalidArgument: the fiducials span less or more than above; the FRE is above kLargestFre_mm; or
 // it is above 2 mm, and at least four fiducials fit four times as well as a mirror image, or with
-// two of them exchanged. The sentence names the mistake that explains it: the unit, left and right,
-// the two fiducials.
+// two of them exchanged; or names contradict places: right and left, nasion and inion (LPS for RAS
+// is a rotation, which the FRE cannot tell). The sentence names the mistake that explains it: the
+// unit, left and right, the two fiducials.
 Status check_head_fit(const Points& measured, const FiducialRegistration& fit,
                       const std::vector<std::string>& names = {});
 

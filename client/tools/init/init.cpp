@@ -116,9 +116,10 @@ struct Draft {
   fs::path mri, brain, tumour_file;
   std::vector<int> labels;                // the tumour's
   std::optional<io::DicomSeries> series;  // of a DICOM MRI
-  VoxelImage grid;                        // of the MRI, without values
+  VoxelImage grid;                        // of the MRI; values too where labels must lie on it
   std::optional<VoxelImage> segments;     // of a DICOM segmentation or structure set
   std::string about_mri, about_brain, about_tumour, about_opening, about_stem, about_gravity;
+  std::string doubt_of_labels;
   double opening_mm = 0.0;
   OpeningGuess opening;
   Vec3 stem = Vec3::Zero(), gravity = Vec3::Zero();
@@ -286,16 +287,49 @@ Status take_mri(Draft& draft) {
     draft.series = std::move(*read);
     draft.grid.dims = draft.series->image.dims;
     draft.grid.T_ras_voxel = draft.series->image.T_ras_voxel;
+    if (!options.labels.empty()) draft.grid.values = draft.series->image.values;
     return {};
   }
   if (io::lower_extension(options.mri) == ".dcm") {
     return invalid("--mri: " + options.mri.string() +
                    ": is one image of a DICOM series: give the folder that holds the series");
   }
-  const auto mri = io::read_volume(options.mri);
+  auto mri = io::read_volume(options.mri);
   if (!mri) return tl::unexpected(mri.error());
   draft.grid.dims = mri->dims, draft.grid.T_ras_voxel = mri->T_ras_voxel;
+  if (!options.labels.empty()) draft.grid.values = std::move(mri->values);
   return {};
+}
+
+// A map that lies elsewhere than the brain of the MRI: a mask that is made of it cannot tell.
+void doubt_labels(Draft& draft, const VoxelImage& labels) {
+  constexpr std::size_t kEnough = 500;
+  constexpr float kAlike = 0.25F;
+  const VoxelImage mri{draft.grid.dims, draft.grid.T_ras_voxel, std::move(draft.grid.values)};
+  const geometry::Interpolator brightness(mri);
+  std::vector<float> fluid, white;
+  std::size_t v = 0;
+  for (int k = 0; k < labels.dims[2]; ++k)
+    for (int j = 0; j < labels.dims[1]; ++j)
+      for (int i = 0; i < labels.dims[0]; ++i, ++v) {
+        const int label = static_cast<int>(std::lround(labels.values[v]));
+        const bool is_fluid = label == 4 || label == 43;  // lateral ventricles
+        const bool is_white = label == 2 || label == 41;
+        if (!is_fluid && !is_white) continue;
+        (is_fluid ? fluid : white).push_back(brightness(labels.T_ras_voxel * Vec3(i, j, k)));
+      }
+  if (std::min(fluid.size(), white.size()) < kEnough) return;
+  const auto median = [](std::vector<float>& values) {
+    const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
+    std::nth_element(values.begin(), middle, values.end());
+    return *middle;
+  };
+  const float in_fluid = median(fluid), in_white = median(white);
+  if (std::abs(in_fluid - in_white) > kAlike * std::abs(in_white)) return;
+  draft.doubt_of_labels = fmt::format(
+      "LOOK AGAIN: the MRI is as bright in the ventricles of {} as in its white matter (medians "
+      "{:.4g} and {:.4g}): does the map lie on this MRI?",
+      draft.options.labels.filename().string(), in_fluid, in_white);
 }
 
 Result<VoxelImage> given_brain(Draft& draft) {
@@ -385,6 +419,7 @@ Result<std::vector<fs::path>> write_files(const Draft& draft, const VoxelImage& 
 std::vector<std::string> guesses_of(const Draft& draft) {
   std::vector<std::string> guesses;
   if (draft.series) guesses.push_back("MRI: " + draft.about_mri);
+  if (!draft.doubt_of_labels.empty()) guesses.push_back("labels: " + draft.doubt_of_labels);
   for (std::string line : {"brain: " + draft.about_brain, "tumour: " + draft.about_tumour,
                            "craniotomy: " + draft.about_opening, "brainstem: " + draft.about_stem,
                            "gravity: " + draft.about_gravity}) {
@@ -450,6 +485,7 @@ Result<InitSummary> write_first_case(const InitOptions& options) {
     auto map = read_labels(options.labels);
     if (!map) return tl::unexpected(map.error());
     labels = std::move(*map);
+    doubt_labels(draft, *labels);
   }
   const auto brain = options.brain.empty() ? guessed_brain(draft, *labels) : given_brain(draft);
   if (!brain) return tl::unexpected(brain.error());

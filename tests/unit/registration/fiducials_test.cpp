@@ -215,6 +215,25 @@ std::string head_refusal(const Points& measured, const Points& image) {
   return head ? "" : head.error().message;
 }
 
+TEST(Fiducials, WhoseNamesContradictTheirPlacesAreRefused) {
+  Points image(3, 4);
+  image << 0, -75, 75, 0, 95, 0, 0, -110, 0, -40, -40, 10;
+  const std::vector<std::string> names = {"Nasion", "left ear", "RIGHT ear", "inion"};
+  const auto refused = [&](const Points& places) {
+    const auto fit = value_or_fail(register_fiducials(image, places));
+    const Status head = check_head_fit(image, fit, names);
+    return head ? "" : head.error().message;
+  };
+  EXPECT_EQ(refused(image), "");
+  Points lps = image;
+  lps.topRows(2) *= -1.0;
+  EXPECT_EQ(refused(lps),
+            "fiducials: in the image 'RIGHT ear' (R -75 mm) lies left of 'left ear' (R 75 mm): "
+            "coordinates in LPS? (a heading name,l,p,s says so)");
+  lps.row(0) *= -1.0;
+  EXPECT_THAT(refused(lps), HasSubstr("'Nasion' (A -95 mm) lies behind 'inion' (A 110 mm)"));
+}
+
 TEST(Fiducials, OfNoHeadAreRefusedByTheirLikelyMistake) {
   const Points image = markers();
   EXPECT_THAT(head_refusal(0.001 * image, 0.001 * image),

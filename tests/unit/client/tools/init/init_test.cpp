@@ -177,6 +177,25 @@ TEST_F(FirstCase, LabelsThatAreNoWholeNumbersAreRefused) {
   EXPECT_THAT(refusal(), HasSubstr(no_map));
 }
 
+// Ventricles that are as bright as white matter, because the map lies 30 mm beside the MRI.
+TEST_F(FirstCase, ALabelMapThatDoesNotLieOnTheMriIsDoubted) {
+  const auto ventricle = [](const Vec3& x) { return (x - Vec3(10, 0, 10)).norm() < 20.0; };
+  const auto map = drawn([&](const Vec3& x) { return ventricle(x) ? 43.0F : label_at(x); });
+  put("labels.nii", map);
+  const auto doubts = [&](const Vec3& moved) {
+    put("t1.nii", drawn([&](const Vec3& x) {
+          return ventricle(x - moved) ? 30.0F : label_at(x - moved) > 0.0F ? 100.0F : 20.0F;
+        }));
+    std::filesystem::remove(folder / "case.yaml");
+    std::filesystem::remove(folder / "case-brain.nii.gz");
+    return value_or_fail(write_first_case(options)).guesses;
+  };
+  const auto doubt =
+      HasSubstr("as bright in the ventricles of labels.nii as in its white matter (medians 100");
+  EXPECT_THAT(doubts(Vec3::Zero()), testing::Not(testing::Contains(doubt)));
+  EXPECT_THAT(doubts(Vec3(-30, 0, 0)), testing::Contains(doubt));
+}
+
 TEST_F(FirstCase, AwkwardNamesComeBackFromTheCase) {
   options.mri = folder / "t1: #1 'a'.nii", options.labels = folder / "la\nbels: [é].nii";
   std::filesystem::rename(folder / "t1.nii", options.mri);
