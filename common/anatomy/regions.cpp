@@ -117,33 +117,19 @@ void fill(std::vector<std::uint8_t>& regions, const std::array<int, 3>& dims) {
 // Labels of the left must lie left of those of the right: x grows to the patient's right.
 Status check_sides(const VoxelImage& map, const std::string& what) {
   double sum[2] = {}, count[2] = {};
-  for (std::size_t v = 0; v < map.values.size(); ++v) {
-    const int label = whole(map.values[v]);
-    if (structure_of(label) != Structure::kCerebrum || side_of(label) == Side::kNone) continue;
-    const std::size_t side = side_of(label) == Side::kLeft ? 0 : 1;
-    const auto nx = static_cast<std::size_t>(map.dims[0]),
-               ny = static_cast<std::size_t>(map.dims[1]);
-    const Vec3 voxel(static_cast<double>(v % nx), static_cast<double>(v / nx % ny),
-                     static_cast<double>(v / nx / ny));
-    sum[side] += (map.T_ras_voxel * voxel).x();
+  const auto has_side = [](float v) {
+    return structure_of(whole(v)) == Structure::kCerebrum && side_of(whole(v)) != Side::kNone;
+  };
+  geometry::for_each_voxel(map, has_side, [&](std::size_t v, const Vec3& x) {
+    const std::size_t side = side_of(whole(map.values[v])) == Side::kLeft ? 0 : 1;
+    sum[side] += x.x();
     count[side] += 1.0;
-  }
+  });
   if (count[0] == 0.0 || count[1] == 0.0 || sum[0] / count[0] < sum[1] / count[1]) return {};
   return invalid(fmt::format(
       "{}: labels of the left hemisphere lie right of those of the right one (middles at R {:.0f} "
       "and {:.0f} mm): the map is mirrored, or its numbers are",
       what, sum[0] / count[0], sum[1] / count[1]));
-}
-
-// The voxels of an image at whose values `is` holds, as points of the head.
-template <typename Is, typename See>
-void for_each_voxel(const VoxelImage& image, const Is& is, const See& see) {
-  std::size_t v = 0;
-  for (int k = 0; k < image.dims[2]; ++k)
-    for (int j = 0; j < image.dims[1]; ++j)
-      for (int i = 0; i < image.dims[0]; ++i, ++v) {
-        if (is(image.values[v])) see(v, Vec3(image.T_ras_voxel * Vec3(i, j, k)));
-      }
 }
 
 // Whether a point of the head lies in a voxel > 0.
@@ -159,9 +145,9 @@ auto inside_mask(const VoxelImage& brain) {
   };
 }
 
-Status check_map(const VoxelImage& map, const CaseInputs& inputs, const std::string& what,
-                 Notes* notes) {
-  const AnatomyConfig& wanted = inputs.config.anatomy;
+// brain: the head's mask; may be empty.
+Status check_map(const VoxelImage& map, const AnatomyConfig& wanted, const VoxelImage& brain,
+                 const std::string& what, Notes* notes) {
   std::set<int> labels;
   for (const float v : map.values) labels.insert(whole(v));
   const auto has = [&](auto&& is) { return std::any_of(labels.begin(), labels.end(), is); };
@@ -190,21 +176,19 @@ Status check_map(const VoxelImage& map, const CaseInputs& inputs, const std::str
   std::copy_if(labels.begin(), labels.end(), std::inserter(strange, strange.end()),
                [&](int label) { return label != 0 && structure_of(label) == Structure::kOther; });
   if (!strange.empty()) {
-    VoxelImage others = map;
-    for (float& v : others.values) v = strange.count(whole(v)) != 0 ? v : 0.0F;
     // Skull and scalp are no part of the brain, and not missed.
-    if (inputs.brain) {
-      for_each_voxel(
-          others, [](float v) { return v != 0.0F; },
-          [&, in_mask = inside_mask(*inputs.brain)](std::size_t v, const Vec3& x) {
-            if (!in_mask(x)) others.values[v] = 0.0F;
-          });
+    VoxelImage others = map;
+    others.values.assign(map.values.size(), 0.0F);
+    geometry::for_each_voxel(
+        map, [&](float v) { return strange.count(whole(v)) != 0; },
+        [&, in_mask = inside_mask(brain)](std::size_t v, const Vec3& x) {
+          if (brain.values.empty() || in_mask(x)) others.values[v] = map.values[v];
+        });
+    if (const std::string list = listed_labels(others); list != "none") {
+      add_note(notes, fmt::format("{}: not of the brain by anatomy.numbers = {}: {}; where the "
+                                  "brain is, the nearest part takes their place",
+                                  what, word_of(wanted.numbers, kNumbersWords), list));
     }
-    if (listed_labels(others) != "none")
-      add_note(notes,
-               fmt::format("{}: not of the brain by anatomy.numbers = {}: {}; where the brain "
-                           "is, the nearest part takes their place",
-                           what, word_of(wanted.numbers, kNumbersWords), listed_labels(others)));
   }
   const std::pair<bool, std::pair<Structure, const char*>> absent[] = {
       {wanted.septa || wanted.tissues, {Structure::kCerebellum, "cerebellum"}},
@@ -249,13 +233,13 @@ class Neighbourhood {
 };
 
 // A map of another head, or of this one elsewhere, puts septa and ventricles where none are.
-Status check_fit(const VoxelImage& map, const CaseInputs& inputs, const std::string& what) {
-  if (!inputs.brain) return {};  // the mesher tells
-  const VoxelImage& brain = *inputs.brain;
+Status check_fit(const VoxelImage& map, const VoxelImage& brain, const std::string& mask,
+                 const std::string& what) {
+  if (brain.values.empty()) return {};
   const auto in_mask = inside_mask(brain);
   Neighbourhood labelled;
   double labels = 0.0, outside = 0.0;
-  for_each_voxel(map, is_brain, [&](std::size_t, const Vec3& x) {
+  geometry::for_each_voxel(map, is_brain, [&](std::size_t, const Vec3& x) {
     labels += 1.0;
     labelled.add(x);
     bool near = in_mask(x);
@@ -265,7 +249,6 @@ Status check_fit(const VoxelImage& map, const CaseInputs& inputs, const std::str
     }
     outside += near ? 0.0 : 1.0;
   });
-  const std::string mask = fmt::format("images.brain = '{}'", inputs.config.brain.string());
   if (outside > Regions::kFarLabels * labels) {
     return invalid(fmt::format(
         "{}: {:.0f} % of its brain lie more than {:g} mm outside the mask of {}: must be at most "
@@ -274,7 +257,7 @@ Status check_fit(const VoxelImage& map, const CaseInputs& inputs, const std::str
   }
   labelled.grow();
   double voxels = 0.0, far = 0.0;
-  for_each_voxel(
+  geometry::for_each_voxel(
       brain, [](float v) { return v > 0.0F; },
       [&](std::size_t, const Vec3& x) {
         voxels += 1.0;
@@ -299,7 +282,7 @@ Status keep_tumour(std::vector<std::uint8_t>& regions, const VoxelImage& map,
   const Vec3 low = tumour.vertices.rowwise().minCoeff();
   const Vec3 high = tumour.vertices.rowwise().maxCoeff();
   std::size_t taken = 0;
-  for_each_voxel(map, is_brain, [&](std::size_t v, const Vec3& x) {
+  geometry::for_each_voxel(map, is_brain, [&](std::size_t v, const Vec3& x) {
     if (regions[v] != kVentricleRegion) return;
     if ((x.array() < low.array()).any() || (x.array() > high.array()).any()) return;
     if (!index->contains(x)) return;
@@ -337,10 +320,14 @@ Result<Regions> Regions::build_from(const CaseInputs& inputs, const VoxelImage& 
                                     const TriangleSurface& tumour, double smoothing_mm,
                                     const std::string& what, Notes* notes) {
   const AnatomyConfig& wanted = inputs.config.anatomy;
-  if (Status status = check_map(map, inputs, what, notes); !status) {
-    return tl::unexpected(status.error());
+  // What the mesher makes of the mask, which also tells what is wrong with it.
+  const std::string mask = fmt::format("images.brain = '{}'", inputs.config.brain.string());
+  const VoxelImage brain =
+      inputs.brain ? brain_mask(*inputs.brain, mask, nullptr).value_or(VoxelImage{}) : VoxelImage{};
+  if (Status good = check_map(map, wanted, brain, what, notes); !good) {
+    return tl::unexpected(good.error());
   }
-  if (Status fits = check_fit(map, inputs, what); !fits) return tl::unexpected(fits.error());
+  if (Status fits = check_fit(map, brain, mask, what); !fits) return tl::unexpected(fits.error());
   const VoxelImage cut = cut_to_labels(map);
   auto kept = std::make_shared<Labels>();
   kept->dims = cut.dims;

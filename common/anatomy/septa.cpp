@@ -6,7 +6,7 @@
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <map>
-#include <numeric>
+#include <optional>
 #include <set>
 #include <utility>
 
@@ -22,9 +22,26 @@ using Facet = std::array<int, 3>;
 
 std::size_t at(int i) { return static_cast<std::size_t>(i); }
 
+// The tetrahedra that stay.
+std::vector<int> untaken(const std::vector<char>& taken) {
+  std::vector<int> tets;
+  for (std::size_t t = 0; t < taken.size(); ++t) {
+    if (!taken[t]) tets.push_back(static_cast<int>(t));
+  }
+  return tets;
+}
+
 double area_of(const Points& nodes, const Facet& f) {
   const Vec3 a = nodes.col(f[0]), b = nodes.col(f[1]), c = nodes.col(f[2]);
   return 0.5 * (b - a).cross(c - a).norm();
+}
+
+// Of a tumour that is not closed there is none: no point is known to lie in it.
+using ClosedTumour = std::optional<geometry::ClosestPointIndex>;
+ClosedTumour closed_tumour(const TriangleSurface& tumour) {
+  if (!geometry::is_closed(tumour)) return {};
+  auto index = geometry::ClosestPointIndex::build(tumour);
+  return index ? ClosedTumour(std::move(*index)) : ClosedTumour();
 }
 
 // Which tetrahedra are taken out.
@@ -68,10 +85,7 @@ std::vector<char> cavities(const TetMesh& mesh, const std::string& what, Notes* 
 // Takes tissue that stands in ventricles and touches no other.
 void take_islands(const TetMesh& mesh, std::vector<char>& taken, const std::string& what,
                   Notes* notes) {
-  std::vector<int> tissue;
-  for (int t = 0; t < mesh.num_tets(); ++t) {
-    if (!taken[at(t)]) tissue.push_back(t);
-  }
+  const std::vector<int> tissue = untaken(taken);
   const geometry::TetComponents parts = geometry::tet_components(mesh.tets(Eigen::all, tissue));
   if (parts.sizes.size() < 2) return;
   const auto brain = std::max_element(parts.sizes.begin(), parts.sizes.end());
@@ -89,15 +103,13 @@ void take_islands(const TetMesh& mesh, std::vector<char>& taken, const std::stri
 
 // kInvalidArgument: the tumour has lost its tissue to the ventricles.
 Status check_tumour(const TetMesh& mesh, const std::vector<char>& taken,
-                    const TriangleSurface& tumour, const std::string& what) {
-  if (!geometry::is_closed(tumour)) return {};
-  const auto index = geometry::ClosestPointIndex::build(tumour);
-  if (!index) return tl::unexpected(index.error());
+                    const ClosedTumour& inside_tumour, const std::string& what) {
+  if (!inside_tumour) return {};
   double all_mm3 = 0.0, lost_mm3 = 0.0;
   for (int t = 0; t < mesh.num_tets(); ++t) {
     Vec3 centre = Vec3::Zero();
     for (int k = 0; k < 4; ++k) centre += 0.25 * mesh.nodes.col(mesh.tets(k, t));
-    if (!index->contains(centre)) continue;
+    if (!inside_tumour->contains(centre)) continue;
     const double volume_mm3 = geometry::tet_volume(mesh, t);
     all_mm3 += volume_mm3;
     lost_mm3 += taken[at(t)] ? volume_mm3 : 0.0;
@@ -183,10 +195,8 @@ geometry::Facets without_teeth_and_islands(geometry::Facets facets, const Points
 // Interface facets of each septum.
 std::array<geometry::Facets, 2> parted_facets(const TetMesh& mesh, const Regions& regions,
                                               const std::vector<char>& taken,
-                                              const TriangleSurface& tumour,
+                                              const ClosedTumour& inside_tumour,
                                               const std::string& what, Notes* notes) {
-  auto inside_tumour = geometry::ClosestPointIndex::build(tumour);
-  if (!geometry::is_closed(tumour)) inside_tumour = fail(ErrorCode::kInvalidArgument, "");
   std::array<geometry::Facets, 2> facets;
   int through_tumour = 0;
   std::map<std::pair<Septum, int>, bool> known;
@@ -224,36 +234,26 @@ std::array<geometry::Facets, 2> parted_facets(const TetMesh& mesh, const Regions
 // kSmallestPiece_mm3 together with all that stays joined to it.
 void join_pieces(const TetMesh& mesh, const std::vector<char>& taken, geometry::Facets& facets,
                  std::vector<int>& septum_of, const std::string& what, Notes* notes) {
-  std::vector<int> parent(at(mesh.num_tets()));
-  std::iota(parent.begin(), parent.end(), 0);
-  const auto root = [&parent](int t) {
-    while (parent[at(t)] != t) t = parent[at(t)] = parent[at(parent[at(t)])];
-    return t;
-  };
-  const std::set<Facet> slit(facets.begin(), facets.end());
-  std::map<Facet, std::pair<int, int>> sides;
-  const std::vector<geometry::MeshFace> faces = geometry::sorted_faces(mesh.tets);
-  for (std::size_t f = 0; f + 1 < faces.size(); ++f) {
-    if (faces[f].nodes != faces[f + 1].nodes) continue;
-    const int a = faces[f].tet, b = faces[f + 1].tet;
-    if (taken[at(a)] || taken[at(b)]) continue;
-    if (slit.count(faces[f].nodes) != 0) {
-      sides[faces[f].nodes] = {a, b};
-    } else {
-      parent[at(root(a))] = root(b);
-    }
+  const std::vector<int> tissue = untaken(taken);
+  const Eigen::Matrix<int, 4, Eigen::Dynamic> tets = mesh.tets(Eigen::all, tissue);
+  geometry::Facets walls = facets;
+  std::sort(walls.begin(), walls.end());
+  const geometry::TetComponents parts = geometry::tet_components(tets, walls);
+  if (parts.sizes.size() < 2) return;
+  std::vector<double> volumes(parts.sizes.size(), 0.0);
+  for (std::size_t i = 0; i < tissue.size(); ++i) {
+    volumes[at(parts.component_of_tet[i])] += geometry::tet_volume(mesh, tissue[i]);
   }
-  std::map<int, double> volumes;
-  for (int t = 0; t < mesh.num_tets(); ++t) {
-    if (!taken[at(t)]) volumes[root(t)] += geometry::tet_volume(mesh, t);
+  std::set<Facet> about_small;
+  for (const geometry::MeshFace& face : geometry::sorted_faces(tets)) {
+    if (volumes[at(parts.component_of_tet[at(face.tet)])] < kSmallestPiece_mm3) {
+      about_small.insert(face.nodes);
+    }
   }
   geometry::Facets kept;
   std::vector<int> kept_septa;
   for (std::size_t i = 0; i < facets.size(); ++i) {
-    const auto [a, b] = sides.at(facets[i]);
-    const bool parts =
-        root(a) != root(b) && std::min(volumes[root(a)], volumes[root(b)]) < kSmallestPiece_mm3;
-    if (parts) continue;
+    if (about_small.count(facets[i]) != 0) continue;
     kept.push_back(facets[i]);
     kept_septa.push_back(septum_of[i]);
   }
@@ -289,11 +289,12 @@ Result<geometry::SlitMesh> with_septa_and_ventricles(const TetMesh& mesh, const 
                                                      const AnatomyConfig& wanted,
                                                      const TriangleSurface& tumour,
                                                      const std::string& what, Notes* notes) {
+  const ClosedTumour inside_tumour = closed_tumour(tumour);
   std::vector<char> taken(at(mesh.num_tets()), 0);
   if (wanted.ventricles) {
     taken = cavities(mesh, what, notes);
     take_islands(mesh, taken, what, notes);
-    if (Status kept = check_tumour(mesh, taken, tumour, what); !kept) {
+    if (Status kept = check_tumour(mesh, taken, inside_tumour, what); !kept) {
       return tl::unexpected(kept.error());
     }
   }
@@ -309,7 +310,7 @@ Result<geometry::SlitMesh> with_septa_and_ventricles(const TetMesh& mesh, const 
     }
     std::sort(rim.begin(), rim.end());
     const std::array<geometry::Facets, 2> found =
-        parted_facets(mesh, regions, taken, tumour, what, notes);
+        parted_facets(mesh, regions, taken, inside_tumour, what, notes);
     for (std::size_t s = 0; s < 2; ++s) {
       const geometry::Facets kept = without_teeth_and_islands(
           found[s], mesh.nodes, rim, s == 0 ? "falx" : "tentorium", what, notes);

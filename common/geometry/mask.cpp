@@ -244,6 +244,16 @@ Result<VoxelImage> largest_component(const VoxelImage& image) {
   return result;
 }
 
+MaskCentre mask_centre(const VoxelImage& mask) {
+  MaskCentre found;
+  double count = 0.0;
+  const auto is_in = [](float value) { return value > 0.0F; };
+  for_each_voxel(mask, is_in, [&](std::size_t, const Vec3& x) { found.centre += x, count += 1.0; });
+  if (count > 0.0) found.centre /= count;
+  found.volume_mm3 = count * std::abs(mask.T_ras_voxel.linear().determinant());
+  return found;
+}
+
 MaskParts mask_parts(const VoxelImage& image) {
   assert(image.values.size() == image.num_voxels());
   Binary voxels(image.values.size());

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Brain masks: threshold, largest component, closing, smoothing.
+// Brain masks: voxels, centre, threshold, largest component, closing, smoothing.
 #pragma once
 
 #include <cstdint>
@@ -9,6 +9,27 @@
 #include "common/core/mesh.hpp"
 
 namespace brainshift::geometry {
+
+// Calls visit(v, x) for every voxel v whose value `is` takes, in the image's order; x: its centre,
+// mm RAS.
+template <typename Is, typename Visit>
+void for_each_voxel(const VoxelImage& image, const Is& is, const Visit& visit) {
+  std::size_t v = 0;
+  for (int k = 0; k < image.dims[2]; ++k) {
+    for (int j = 0; j < image.dims[1]; ++j) {
+      for (int i = 0; i < image.dims[0]; ++i, ++v) {
+        if (is(image.values[v])) visit(v, Vec3(image.T_ras_voxel * Vec3(i, j, k)));
+      }
+    }
+  }
+}
+
+// Of the voxels > 0: the mean of their centres (mm RAS; 0 without any) and their volume.
+struct MaskCentre {
+  Vec3 centre = Vec3::Zero();
+  double volume_mm3 = 0.0;
+};
+MaskCentre mask_centre(const VoxelImage& mask);
 
 // 1 where the voxel is > 0 and belongs to the largest 6-connected component, or to a cavity of
 // it; else 0. A cavity is a 6-connected set of other voxels that does not reach the border of the

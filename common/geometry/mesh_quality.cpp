@@ -139,7 +139,8 @@ Status check_connected(const TetMesh& mesh) {
 
 }  // namespace
 
-TetComponents tet_components(const Eigen::Matrix<int, 4, Eigen::Dynamic>& tets) {
+TetComponents tet_components(const Eigen::Matrix<int, 4, Eigen::Dynamic>& tets,
+                             const std::vector<std::array<int, 3>>& walls) {
   std::vector<int> parent(static_cast<std::size_t>(tets.cols()));
   std::iota(parent.begin(), parent.end(), 0);
   const auto root = [&parent](int t) {
@@ -153,6 +154,7 @@ TetComponents tet_components(const Eigen::Matrix<int, 4, Eigen::Dynamic>& tets) 
   const std::vector<MeshFace> faces = sorted_faces(tets);
   for (std::size_t f = 1; f < faces.size(); ++f) {
     if (faces[f].nodes != faces[f - 1].nodes) continue;
+    if (std::binary_search(walls.begin(), walls.end(), faces[f].nodes)) continue;
     const int a = root(faces[f].tet);
     const int b = root(faces[f - 1].tet);
     parent[static_cast<std::size_t>(std::max(a, b))] = std::min(a, b);

@@ -30,8 +30,10 @@ struct TetComponents {
   std::vector<int> sizes;             // tetrahedra per component
 };
 
-// Precondition: node indices are >= 0.
-TetComponents tet_components(const Eigen::Matrix<int, 4, Eigen::Dynamic>& tets);
+// walls: faces that join nothing, by their nodes in increasing order, sorted. Precondition: node
+// indices are >= 0.
+TetComponents tet_components(const Eigen::Matrix<int, 4, Eigen::Dynamic>& tets,
+                             const std::vector<std::array<int, 3>>& walls = {});
 
 // Ok, or one sentence that names the first offender.
 //   kNotFinite        a node

@@ -4,9 +4,12 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cctype>
 #include <cmath>
+#include <initializer_list>
 #include <limits>
 #include <optional>
+#include <string_view>
 #include <utility>
 
 #include "common/core/small_matrices.hpp"
@@ -28,6 +31,8 @@ constexpr double kExtentRatio = 1.5;
 // fiducials fit too many ways.
 constexpr double kExplainable_mm = 2.0, kExplained = 0.25;
 constexpr Eigen::Index kTold = 4;
+// Names of sides say nothing of fiducials that lie this near each other.
+constexpr double kOnOneSide_mm = 20.0;
 
 double extent_mm(const Points& points) {
   double extent = 0.0;
@@ -148,6 +153,52 @@ std::string what_explains(const Points& measured, const FiducialRegistration& fo
   return exchanged.substr(0, exchanged.size() - 1) + ", or" + mirrored.substr(1);
 }
 
+// Whether a word of the name, in any case, begins with `word`.
+bool names_place(const std::string& name, std::string_view word) {
+  const auto lower = [](char c) { return std::tolower(static_cast<unsigned char>(c)); };
+  const auto letter = [](char c) { return std::isalpha(static_cast<unsigned char>(c)) != 0; };
+  const auto same = [&](char a, char b) { return lower(a) == lower(b); };
+  for (auto at = name.begin(); at != name.end(); ++at) {
+    at = std::search(at, name.end(), word.begin(), word.end(), same);
+    if (at == name.end()) return false;
+    if (at == name.begin() || !letter(*(at - 1))) return true;
+  }
+  return false;
+}
+
+// What a name says of the place of its fiducial along `axis`: +1 or -1, 0: nothing.
+int side_told(const std::string& name, Eigen::Index axis) {
+  const auto any = [&name](std::initializer_list<const char*> words) {
+    return std::any_of(words.begin(), words.end(),
+                       [&name](const char* word) { return names_place(name, word); });
+  };
+  const bool more = axis == 0 ? any({"right"}) : any({"nasion", "nose", "glabella"});
+  const bool less = axis == 0 ? any({"left"}) : any({"inion", "occiput"});
+  return more == less ? 0 : more ? 1 : -1;
+}
+
+// Half a turn about an axis, LPS for RAS, leaves distances as they are; names tell it.
+Status check_named_sides(const Points& image, const std::vector<std::string>& names) {
+  if (static_cast<Eigen::Index>(names.size()) != image.cols()) return {};
+  for (const Eigen::Index axis : {0, 1}) {
+    const char* const letter = axis == 0 ? "R" : "A";
+    for (Eigen::Index i = 0; i < image.cols(); ++i) {
+      for (Eigen::Index j = 0; j < image.cols(); ++j) {
+        const auto &more = names[static_cast<std::size_t>(i)],
+                   &less = names[static_cast<std::size_t>(j)];
+        if (side_told(more, axis) != 1 || side_told(less, axis) != -1) continue;
+        if (image(axis, i) > image(axis, j) - kOnOneSide_mm) continue;
+        return invalid(fmt::format(
+            "fiducials: in the image {} ({} {:.0f} mm) lies {} {} ({} {:.0f} mm): coordinates in "
+            "LPS? (a heading name,l,p,s says so)",
+            in_quotes(more), letter, image(axis, i), axis == 0 ? "left of" : "behind",
+            in_quotes(less), letter, image(axis, j)));
+      }
+    }
+  }
+  return {};
+}
+
 // Depth-first over assignments. A branch ends where a distance to a fiducial that is already
 // assigned does not fit.
 class Matcher {
@@ -266,47 +317,10 @@ Result<FiducialRegistration> match_fiducials(const Points& measured, const Point
   return *matcher.best();
 }
 
-namespace {
-
-// What a name says of the place of its fiducial along `axis`: +1 or -1, 0: nothing.
-int side_told(std::string name, Eigen::Index axis) {
-  std::transform(name.begin(), name.end(), name.begin(),
-                 [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
-  const auto has = [&name](const char* word) { return name.find(word) != std::string::npos; };
-  if (axis == 0) return has("left") == has("right") ? 0 : has("right") ? 1 : -1;
-  const bool front = has("nasion") || has("nose") || has("glabella");
-  const bool back = has("inion") || has("occiput");
-  return front == back ? 0 : front ? 1 : -1;
-}
-
-// Half a turn about an axis, LPS for RAS, leaves distances as they are; names tell it.
-Status check_named_sides(const Points& image, const std::vector<std::string>& names) {
-  for (const Eigen::Index axis : {0, 1}) {
-    for (Eigen::Index i = 0; i < image.cols(); ++i) {
-      for (Eigen::Index j = 0; j < image.cols(); ++j) {
-        const auto &more = names[static_cast<std::size_t>(i)],
-                   &less = names[static_cast<std::size_t>(j)];
-        if (side_told(more, axis) != 1 || side_told(less, axis) != -1) continue;
-        if (image(axis, i) > image(axis, j)) continue;
-        return invalid(fmt::format(
-            "fiducials: in the image '{}' ({}{:.0f} mm) lies {} '{}' ({}{:.0f} mm): coordinates in "
-            "LPS? (a heading name,l,p,s says so)",
-            more, axis == 0 ? "R " : "A ", image(axis, i), axis == 0 ? "left of" : "behind", less,
-            axis == 0 ? "R " : "A ", image(axis, j)));
-      }
-    }
-  }
-  return {};
-}
-
-}  // namespace
-
 Status check_head_fit(const Points& measured, const FiducialRegistration& fit,
                       const std::vector<std::string>& names) {
   if (Status good = check_span(fit.image); !good) return good;
-  if (static_cast<Eigen::Index>(names.size()) == fit.image.cols()) {
-    if (Status sides = check_named_sides(fit.image, names); !sides) return sides;
-  }
+  if (Status sides = check_named_sides(fit.image, names); !sides) return sides;
   const bool too_large = !(fit.fre_mm <= kLargestFre_mm);
   const bool told = fit.image.cols() >= kTold && fit.fre_mm > kExplainable_mm;
   if (!too_large && !told) return {};

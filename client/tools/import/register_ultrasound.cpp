@@ -14,6 +14,7 @@
 #include "common/core/small_matrices.hpp"
 #include "common/geometry/closest_point.hpp"
 #include "common/geometry/distance_volume.hpp"
+#include "common/geometry/mask.hpp"
 #include "common/geometry/surface.hpp"
 #include "common/io/files/file_access.hpp"
 #include "common/io/geometry/label_map_file.hpp"
@@ -87,21 +88,6 @@ Result<VoxelImage> given_mask(const fs::path& path, anatomy::Notes& notes) {
   return anatomy::brain_mask(*image, path.string(), &notes);
 }
 
-// Precondition: a voxel is > 0.
-Vec3 middle_of(const VoxelImage& mask) {
-  Vec3 sum = Vec3::Zero();
-  double count = 0.0;
-  std::size_t v = 0;
-  for (int k = 0; k < mask.dims[2]; ++k) {
-    for (int j = 0; j < mask.dims[1]; ++j) {
-      for (int i = 0; i < mask.dims[0]; ++i, ++v) {
-        if (mask.values[v] > 0.0F) sum += Vec3(i, j, k), count += 1.0;
-      }
-    }
-  }
-  return mask.T_ras_voxel * Vec3(sum / count);
-}
-
 Result<PatientImages> read_images(const UltrasoundRegisterOptions& options,
                                   const Progress& progress, anatomy::Notes& notes) {
   PatientImages images;
@@ -115,9 +101,9 @@ Result<PatientImages> read_images(const UltrasoundRegisterOptions& options,
   }
   if (options.target) {
     images.target = *options.target;
-    const Status reached =
-        check_reach(images.target, "--target " + error_place(options.target),
-                    middle_of(images.brain), "the brain in " + options.brain.string());
+    const Status reached = check_reach(images.target, "--target " + error_place(options.target),
+                                       geometry::mask_centre(images.brain).centre,
+                                       "the brain in " + options.brain.string());
     if (!reached) return tl::unexpected(reached.error());
     return images;
   }
@@ -174,19 +160,6 @@ int block_px(const ultrasound::ImagePoses& poses) {
   return static_cast<int>(std::clamp(std::round(kSample_mm / pixel), 1.0, 20.0));
 }
 
-// The expected error is a jackknife over kParts parts, which must err independently: parts of one
-// frame do not.
-Status check_frames(const UltrasoundRegisterOptions& options,
-                    const UltrasoundRegisterReport& report, int frames) {
-  if (frames >= kParts) return {};
-  return io::file_error(
-      ErrorCode::kEmptySet, options.ultrasound,
-      fmt::format(
-          "has too few frames: {} of {} have a valid chain and a place of their own, {} are "
-          "needed",
-          frames, report.frames, kParts));
-}
-
 // Where the frames' samples lie in the reference frame. Fills in what the report says of frames;
 // `poses` keeps those that are used.
 Result<IntensitySamples> reference_samples(const UltrasoundRegisterOptions& options,
@@ -214,9 +187,6 @@ Result<IntensitySamples> reference_samples(const UltrasoundRegisterOptions& opti
         ErrorCode::kEmptySet, options.ultrasound,
         fmt::format("none of {} frames has a valid chain{}", report.frames, reasons));
   }
-  if (Status ok = check_frames(options, report, chain->used); !ok) {
-    return tl::unexpected(ok.error());
-  }
   poses = std::move(chain->T_target_source);
   report.frames_repeated = leave_out_repeats(recording, poses);
   auto samples = ultrasound::frame_samples(
@@ -230,9 +200,14 @@ Result<IntensitySamples> reference_samples(const UltrasoundRegisterOptions& opti
                     "one plane, {:g} mm are needed; sweep or tilt the probe across the brain",
                     report.frames_valid - report.frames_repeated, thickness, kLeastThickness_mm));
   }
-  const int placed_frames = report.frames_valid - report.frames_repeated;
-  if (Status ok = check_frames(options, report, placed_frames); !ok) {
-    return tl::unexpected(ok.error());
+  if (const int frames = report.frames_valid - report.frames_repeated; frames < kParts) {
+    // The expected error is a jackknife over kParts parts, which must err independently: parts of
+    // one frame do not.
+    return io::file_error(
+        ErrorCode::kEmptySet, options.ultrasound,
+        fmt::format("has too few frames: {} of {} have a valid chain and a place of their own, {} "
+                    "are needed",
+                    frames, report.frames, kParts));
   }
   report.samples = samples->positions.cols();
   return samples;

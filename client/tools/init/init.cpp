@@ -40,31 +40,12 @@ constexpr double kCap_mm = 3.0;
 // An opening is wider than the tumour's ball.
 constexpr double kOpeningMargin_mm = 20.0, kSmallOpening_mm = 40.0, kLargeOpening_mm = 80.0;
 
-// Calls take(place, value) for every voxel > 0.
+// Calls take(place) for every voxel > 0.
 template <typename Take>
-void for_each_voxel(const VoxelImage& mask, const Take& take) {
-  std::size_t v = 0;
-  for (int k = 0; k < mask.dims[2]; ++k) {
-    for (int j = 0; j < mask.dims[1]; ++j) {
-      for (int i = 0; i < mask.dims[0]; ++i, ++v) {
-        if (mask.values[v] > 0.0F) take(Vec3(mask.T_ras_voxel * Vec3(i, j, k)));
-      }
-    }
-  }
-}
-
-struct Centre {
-  Vec3 at = Vec3::Zero();
-  double cc = 0.0;
-};
-Centre centre_of_mask(const VoxelImage& mask) {
-  Centre centre;
-  std::size_t count = 0;
-  for_each_voxel(mask, [&](const Vec3& x) { centre.at += x, ++count; });
-  centre.at /= static_cast<double>(std::max<std::size_t>(count, 1));
-  centre.cc =
-      static_cast<double>(count) * std::abs(mask.T_ras_voxel.linear().determinant()) / kMm3PerCc;
-  return centre;
+void for_each_of(const VoxelImage& mask, const Take& take) {
+  geometry::for_each_voxel(
+      mask, [](float value) { return value > 0.0F; },
+      [&take](std::size_t, const Vec3& x) { take(x); });
 }
 
 Status check_options(const InitOptions& options) {
@@ -116,8 +97,8 @@ struct Draft {
   fs::path mri, brain, tumour_file;
   std::vector<int> labels;                // the tumour's
   std::optional<io::DicomSeries> series;  // of a DICOM MRI
-  VoxelImage grid;                        // of the MRI; values too where labels must lie on it
-  std::optional<VoxelImage> segments;     // of a DICOM segmentation or structure set
+  VoxelImage mri_image;
+  std::optional<VoxelImage> segments;  // of a DICOM segmentation or structure set
   std::string about_mri, about_brain, about_tumour, about_opening, about_stem, about_gravity;
   std::string doubt_of_labels;
   double opening_mm = 0.0;
@@ -230,8 +211,8 @@ Status guess_tumour(Draft& draft, const VoxelImage& brain) {
   const InitOptions& options = draft.options;
   MriIdentity mri;
   if (draft.series) mri = {draft.series->frame_of_reference, draft.series->series};
-  auto given =
-      read_tumour({options.tumour, options.tumour_label, options.tumour_segment}, draft.grid, mri);
+  auto given = read_tumour({options.tumour, options.tumour_label, options.tumour_segment},
+                           draft.mri_image, mri);
   if (!given) return tl::unexpected(given.error());
   draft.labels = given->labels;
   anatomy::Notes notes;
@@ -285,9 +266,7 @@ Status take_mri(Draft& draft) {
     draft.mri = beside(options.out, "-mri.nii.gz");
     draft.about_mri = about_series(*read);
     draft.series = std::move(*read);
-    draft.grid.dims = draft.series->image.dims;
-    draft.grid.T_ras_voxel = draft.series->image.T_ras_voxel;
-    if (!options.labels.empty()) draft.grid.values = draft.series->image.values;
+    draft.mri_image = draft.series->image;
     return {};
   }
   if (io::lower_extension(options.mri) == ".dcm") {
@@ -296,8 +275,7 @@ Status take_mri(Draft& draft) {
   }
   auto mri = io::read_volume(options.mri);
   if (!mri) return tl::unexpected(mri.error());
-  draft.grid.dims = mri->dims, draft.grid.T_ras_voxel = mri->T_ras_voxel;
-  if (!options.labels.empty()) draft.grid.values = std::move(mri->values);
+  draft.mri_image = std::move(*mri);
   return {};
 }
 
@@ -305,19 +283,21 @@ Status take_mri(Draft& draft) {
 void doubt_labels(Draft& draft, const VoxelImage& labels) {
   constexpr std::size_t kEnough = 500;
   constexpr float kAlike = 0.25F;
-  const VoxelImage mri{draft.grid.dims, draft.grid.T_ras_voxel, std::move(draft.grid.values)};
-  const geometry::Interpolator brightness(mri);
-  std::vector<float> fluid, white;
-  std::size_t v = 0;
-  for (int k = 0; k < labels.dims[2]; ++k)
-    for (int j = 0; j < labels.dims[1]; ++j)
-      for (int i = 0; i < labels.dims[0]; ++i, ++v) {
-        const int label = static_cast<int>(std::lround(labels.values[v]));
-        const bool is_fluid = label == 4 || label == 43;  // lateral ventricles
-        const bool is_white = label == 2 || label == 41;
-        if (!is_fluid && !is_white) continue;
-        (is_fluid ? fluid : white).push_back(brightness(labels.T_ras_voxel * Vec3(i, j, k)));
-      }
+  const geometry::Interpolator brightness(draft.mri_image);
+  const auto number = [](float value) { return static_cast<int>(std::lround(value)); };
+  const auto of = [&](const auto& is) {
+    std::vector<float> values;
+    geometry::for_each_voxel(labels, is,
+                             [&](std::size_t, const Vec3& x) { values.push_back(brightness(x)); });
+    return values;
+  };
+  std::vector<float> fluid = of([&](float value) {
+    return anatomy::structure_of(number(value)) == anatomy::Structure::kVentricle;
+  });
+  std::vector<float> white = of([&](float value) {
+    return anatomy::structure_of(number(value)) == anatomy::Structure::kCerebrum &&
+           anatomy::matter_of(number(value)) == anatomy::Matter::kWhite;
+  });
   if (std::min(fluid.size(), white.size()) < kEnough) return;
   const auto median = [](std::vector<float>& values) {
     const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
@@ -339,7 +319,8 @@ Result<VoxelImage> given_brain(Draft& draft) {
   anatomy::Notes notes;
   auto mask = anatomy::brain_mask(*given, file, &notes);
   if (!mask) return mask;
-  draft.about_brain = fmt::format("Given; {:.0f} cc.", centre_of_mask(*mask).cc);
+  draft.about_brain =
+      fmt::format("Given; {:.0f} cc.", geometry::mask_centre(*mask).volume_mm3 / kMm3PerCc);
   for (const std::string& note : notes) {
     draft.about_brain += " " + note.substr(file.size() + 2) + ".";
   }
@@ -354,7 +335,7 @@ Result<VoxelImage> guessed_brain(Draft& draft, const VoxelImage& labels) {
   draft.about_brain = fmt::format(
       "GUESS: cerebrum, cerebellum, brainstem and ventricles of {}, with sulci closed; "
       "{:.0f} cc.",
-      options.labels.filename().string(), centre_of_mask(*mask).cc);
+      options.labels.filename().string(), geometry::mask_centre(*mask).volume_mm3 / kMm3PerCc);
   return mask;
 }
 
@@ -431,25 +412,24 @@ std::vector<std::string> guesses_of(const Draft& draft) {
 }  // namespace
 
 Vec3 lowest_part(const VoxelImage& mask, double half_width_mm) {
-  const double middle = centre_of_mask(mask).at.x();
+  const double middle = geometry::mask_centre(mask).centre.x();
   const auto counts = [&](const Vec3& x) { return std::abs(x.x() - middle) <= half_width_mm; };
   double lowest = std::numeric_limits<double>::infinity();
-  for_each_voxel(mask,
-                 [&](const Vec3& x) { lowest = counts(x) ? std::min(lowest, x.z()) : lowest; });
+  for_each_of(mask, [&](const Vec3& x) { lowest = counts(x) ? std::min(lowest, x.z()) : lowest; });
   Vec3 sum = Vec3::Zero();
   double count = 0.0;
-  for_each_voxel(mask, [&](const Vec3& x) {
+  for_each_of(mask, [&](const Vec3& x) {
     if (counts(x) && x.z() <= lowest + kLowest_mm) sum += x, count += 1.0;
   });
   return sum / count;
 }
 
 OpeningGuess opening_over(const VoxelImage& mask, const Vec3& tumour) {
-  const Vec3 middle = centre_of_mask(mask).at;
+  const Vec3 middle = geometry::mask_centre(mask).centre;
   // The farthest place in each cell of 5 by 5 degrees.
   constexpr double kCells = 72.0 / (2.0 * std::numbers::pi);
   std::map<std::pair<int, int>, Vec3> farthest;
-  for_each_voxel(mask, [&](const Vec3& x) {
+  for_each_of(mask, [&](const Vec3& x) {
     const Vec3 d = x - middle;
     const double height = std::asin(std::clamp(d.z() / std::max(d.norm(), 1e-9), -1.0, 1.0));
     const auto cell = std::pair(static_cast<int>(std::floor(kCells * std::atan2(d.y(), d.x()))),

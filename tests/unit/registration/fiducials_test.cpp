@@ -218,20 +218,28 @@ std::string head_refusal(const Points& measured, const Points& image) {
 TEST(Fiducials, WhoseNamesContradictTheirPlacesAreRefused) {
   Points image(3, 4);
   image << 0, -75, 75, 0, 95, 0, 0, -110, 0, -40, -40, 10;
-  const std::vector<std::string> names = {"Nasion", "left ear", "RIGHT ear", "inion"};
+  std::vector<std::string> names = {"Nasion", "left ear", "RIGHT ear", "inion"};
   const auto refused = [&](const Points& places) {
-    const auto fit = value_or_fail(register_fiducials(image, places));
-    const Status head = check_head_fit(image, fit, names);
+    const auto fit = value_or_fail(register_fiducials(places, places));
+    const Status head = check_head_fit(places, fit, names);
     return head ? "" : head.error().message;
   };
   EXPECT_EQ(refused(image), "");
+  // "bright", and places near the midline, say nothing.
+  names = {"Nasion", "bright", "left, cleft", "inion"};
+  EXPECT_EQ(refused(image), "");
+  names = {"right of nasion", "left ear", "right ear", "left of nasion"};
+  Points close = image;
+  close.col(3) = Vec3(6, 80, 5);
+  EXPECT_EQ(refused(close), "");
+  names = {"Nasion", "left ear", "RIGHT ear", "inion"};
   Points lps = image;
   lps.topRows(2) *= -1.0;
   EXPECT_EQ(refused(lps),
-            "fiducials: in the image 'RIGHT ear' (R -75 mm) lies left of 'left ear' (R 75 mm): "
+            "fiducials: in the image \"RIGHT ear\" (R -75 mm) lies left of \"left ear\" (R 75 mm): "
             "coordinates in LPS? (a heading name,l,p,s says so)");
   lps.row(0) *= -1.0;
-  EXPECT_THAT(refused(lps), HasSubstr("'Nasion' (A -95 mm) lies behind 'inion' (A 110 mm)"));
+  EXPECT_THAT(refused(lps), HasSubstr("\"Nasion\" (A -95 mm) lies behind \"inion\" (A 110 mm)"));
 }
 
 TEST(Fiducials, OfNoHeadAreRefusedByTheirLikelyMistake) {
