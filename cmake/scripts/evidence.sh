@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 # evidence.sh BUILD_DIR [OUT_DIR]: twins of the paper's five patients, against truths that share the
 # estimate's model and against truths that do not (docs/evidence.md). Writes to OUT_DIR (default:
-# out/evidence): rows-HEAD.csv (a row per update), points.csv, checks.csv, left_out.csv, pictures,
+# out/evidence): rows-HEAD.csv and outlines-HEAD.csv (a row per update), checks.csv, left_out.csv, pictures,
 # patients-HEAD.md (the paper's Tables 3 to 6 beside ours), page.md (the tables of docs/evidence.md),
 # tables.md, summary.json; landmarks-CASE.csv where BRAINSHIFT_EXTERNAL_DATA has landmarks; patient-N/, a
 # report of patients 1 to 4 as the daemon and the client play them (the paper's Figs. 6 to 8). Truths from
@@ -15,6 +15,7 @@
 #   HEADS="..."      case files of heads (default: colin27, and mni152 where it can be had; the truth
 #                    `calculix` is of colin27 alone)
 #   SEEDS=N          surgeries per patient and truth (default: 2)
+#   OUTLINES=N       sags seen through a wrong outline, which must not pass for swelling (default: 12)
 #   QUICK=1          patients 1 and 2, consistency, mesh, gap and all, one seed (1001), 6 thousand nodes;
 #                    into out/evidence-quick
 set -euo pipefail
@@ -68,6 +69,10 @@ if [ "${QUICK:-0}" != 1 ]; then
 fi
 for head in ${HEADS:-$heads}; do
   step "$head" "$bin/evidence" --head "$head" --out "$out/rows-$head.csv" "${options[@]}" || status=1
+  if [ "${QUICK:-0}" != 1 ]; then
+    step "$head, outlines" "$bin/evidence" --head "$head" --patients 1 --truths segmentation \
+      --seeds "${OUTLINES:-12}" --resume --out "$out/outlines-$head.csv" || status=1
+  fi
 done
 # Truths from outside the prior on the same patients.
 outside_of_patients() {

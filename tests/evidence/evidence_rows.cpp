@@ -39,6 +39,8 @@ void add_estimate(const Update& update, Cells& cells) {
   cells.add("quality", std::string(to_string(estimate.quality.quality)));
   cells.add("contradictions", contradictions);
   cells.add("misfit_mm", estimate.misfit_mm.mean);
+  cells.add("swelling_absent",
+            estimate.prior_absent[static_cast<std::size_t>(PriorPart::kTumourVolume)]);
   cells.add("active", estimate.contact.active);
   cells.add("contact_sets", estimate.contact.iterations);
   cells.add("update_ms",

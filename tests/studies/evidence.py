@@ -24,6 +24,9 @@ COVERAGE = (0.75, 0.97)  # bounds of the mean over the adverse truths
 COLUMNS = ("head", "patient", "truth", "seed", "boundary", "data", "status", "reason", "nodes", "initial_mm",
            "recovered_pct", "tumour_mm", "shift_tumour_mm", "rigid_tumour_mm", "initial_cppd_mm", "cppd_mm",
            "coverage_90", "direction_deg", "true_direction_deg", "quality", "contact_sets", "update_ms")
+OUTLINES = ("head", "patient", "truth", "seed", "boundary", "data", "swelling_absent")
+WITHOUT_SWELLING = ("1",)  # patients (docs/evidence/truths.md)
+ONE_NAT = 1 / (1 + math.e)  # what is left for "no swelling" where the odds, even before, are e to 1 against it
 LANDMARKS = ("pose", "landmark", *(column for _, column in MAPS), "sd_mm", "inside_90", "quality")
 INTERVALS = (50, 68, 80, 90, 95, 99)
 
@@ -156,6 +159,19 @@ def over_fixed(by, name):
     return clusters.same_over(contact, fixed, name, patient=("patient",), truth=("truth", "seed"))
 
 
+def check_outlines(rows, record):
+    """Of one head: sags seen through an outline that is off, which must not be taken for swelling. rows: those of
+    patients without swelling under the truth `segmentation`."""
+    own = rows.where(lambda row: row["patient"] in WITHOUT_SWELLING, truth="segmentation", boundary="contact")
+    absent = own.finite("swelling_absent")
+    if not len(absent):
+        return
+    taken = 100 * sum(absent < ONE_NAT) / len(absent)
+    record.check(own[0]["head"], "segmentation: updates that take the outline's error for swelling %", taken,
+                 f"<= 10 (by more than one nat; {len(absent)} updates of sags)", taken <= 10,
+                 f"{len(own.values('seed'))} surgeries of patients without swelling")
+
+
 def check_landmarks(study, rows, record):
     """Landmarks of a real operation, each predicted from the others alone; in each pose of the head."""
     for pose, own in rows.groups("pose").items():
@@ -258,6 +274,9 @@ def main(arguments):
         draw_landmarks(case, own, folder)
     for head, own in rows.groups("head").items():
         EvidenceChecks(own, record).run()
+        outlines = folder / f"outlines-{head}.csv"
+        if outlines.exists():
+            check_outlines(Table.read(outlines, OUTLINES), record)
         write_file(folder / f"patients-{head}.md", patient_tables(own))
     record.save()
     write_file(folder / "page.md", page(rows, Table.read(folder / "checks.csv", ("study",)), landmarks))

@@ -12,6 +12,7 @@ from studies.rows import Table
 FOLDER = DOCS / "evidence"
 TABLES = sorted(FOLDER.glob("rows-*.csv"))
 LANDMARKS = {path.stem.removeprefix("landmarks-"): path for path in sorted(FOLDER.glob("landmarks-*.csv"))}
+OUTLINES = {path.stem.removeprefix("outlines-"): path for path in sorted(FOLDER.glob("outlines-*.csv"))}
 PAGE = (DOCS / "evidence.md").read_text()
 
 
@@ -48,8 +49,10 @@ def test_committed_rows_give_the_committed_checks():
     def judge(record):
         for case, table in LANDMARKS.items():
             evidence.check_landmarks(case, Table.read(table), record)
-        for own in Table.read_all(TABLES).groups("head").values():
+        for head, own in Table.read_all(TABLES).groups("head").items():
             evidence.EvidenceChecks(own, record).run()
+            if head in OUTLINES:
+                evidence.check_outlines(Table.read(OUTLINES[head], evidence.OUTLINES), record)
     assert judged(judge) == committed("evidence")
 
 
@@ -136,6 +139,15 @@ def test_an_update_worse_than_a_rigid_shift_is_counted():
         assert verdict(rows, name) == "1"
         rows[0]["tumour_mm"] = 0.5
         assert verdict(rows, name) == "0"
+
+
+def test_an_outline_that_is_off_must_not_pass_for_swelling():
+    def verdict(absent, **where):
+        rows = of([{**row, "swelling_absent": 0.9} for row in good("segmentation")], {"swelling_absent": absent}, **where)
+        return [line.split(",")[4] for line in Verdicts(lambda record: evidence.check_outlines(table_of(rows), record)).lines]
+    assert verdict(0.27, patient=1) == ["1"] and verdict(0.26, patient=1) == ["0"]  # one nat: 0.269
+    assert verdict(0.0, patient=2) == verdict(0.0, boundary="fixed") == ["1"]  # it does swell; not the default
+    assert verdict(0.0, patient=1, seed=1) == ["0"]  # a quarter of the updates
 
 
 def test_claims_name_what_missed_its_bound_and_leave_out_what_has_none():
