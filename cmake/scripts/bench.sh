@@ -40,6 +40,13 @@ prepare_region() {
   prepare "$out/region.yaml" region prepare-region
 }
 
+# The default case with a deadline of 100 ms.
+prepare_hurried() {
+  sed 's/^  deadline_ms: .*/  deadline_ms: 100/' "$case_file" >"$out/hurried.yaml" || return
+  grep -q '^  deadline_ms: 100$' "$out/hurried.yaml" || return
+  prepare "$out/hurried.yaml" hurried prepare-hurried && rm "$out/prepare-hurried.json"
+}
+
 # The default case with edges for $1 thousand nodes, as bench_error_time scales them.
 prepare_size() {
   awk -v size="$1" '/^ *(tumour_|craniotomy_)?edge_mm:/ { $2 = $2 * (18 / size) ^ (1 / 3); $1 = "    " $1 } 1' \
@@ -91,6 +98,28 @@ measure_growth() {
   rm "$out"/run-{warm-up,growth}.json "$out"/latency-{warm-up,growth}.csv
 }
 
+# Sag of patient 1, forward: the same mesh, forces and contact in the forward model here and in CalculiX. A row each of
+# peers.csv.
+peer() {  # NAME DECK_FILTER OPTIONS...
+  local folder=$out/peer began seconds
+  empty_folder "$folder" || return
+  sed "$2" tests/evidence/calculix/patient.inp >"$folder/patient.inp" || return
+  "$bin/evidence_calculix" write --patient 1 --folder "$folder" "${@:3}" || return
+  began=$EPOCHREALTIME
+  (cd "$folder" && OMP_NUM_THREADS=2 ccx patient >ccx.log) || return
+  seconds=$(seconds_since "$began" 1)
+  "$bin/evidence_calculix" read --patient 1 --folder "$folder" || return
+  awk -v row="$1,$seconds" 'NR == 2 { print row "," $0 }' "$folder/apart.csv" >>"$out/peers.csv"
+}
+peers() {
+  echo "code,seconds,mean_mm,max_mm" >"$out/peers.csv"
+  peer "CalculiX: linear elastic; small displacements" 's/, NLGEOM//' --linear || return
+  peer "CalculiX: neo-Hookean; large displacements" '' || return
+  awk -F, 'NR == 2 { printf "here: assembly and factor,%s,,\nhere: contact by that factor,%s,0,0\n", $1, $2 }' \
+    "$out/peer/forward.csv" >>"$out/peers.csv" || return
+  rm -r "$out/peer"
+}
+
 # Every latency of one kernel; $1: "" or @KERNEL, $2: which recording of sag-progress.
 latencies() {
   step "serve: load the model file$1" serve colin27
@@ -109,6 +138,12 @@ latencies() {
   step "serve: the region about the tumour$1" start_daemon "$out/region.h5"
   step "replay: region$1" replay short "region$1"
   step "stop: daemon" stop_daemon
+  [ -z "$1" ] || return 0
+  step "serve: a deadline of 100 ms" start_daemon "$out/hurried.h5"
+  for one in joint-mixed distension; do
+    step "replay: $one, a deadline of 100 ms" replay "$one" "$one-100ms"
+  done
+  step "stop: daemon" stop_daemon
 }
 
 empty_folder "$out"
@@ -117,6 +152,7 @@ echo "name,value" >"$out/facts.csv"
 
 step "prepare: default case, both boundaries" prepare "$case_file" colin27 prepare
 step "prepare: the same with the region about the tumour only" prepare_region
+step "prepare: the same with a deadline of 100 ms" prepare_hurried
 # 20 moments in sag-progress, 1 in the others.
 step "observe: sag-progress, $((20 * each)) observations" observe sag-progress sag-progress "$each"
 step "observe: sag-progress, 200 observations" observe short sag-progress 10
@@ -139,7 +175,7 @@ stages() {
     "$out"/{short,paper,no-contact,joint-sag,joint-mixed,distension}.surgery
 }
 step "stages: where the time of an update goes" stages
-rm "$out"/*.surgery "$out"/*.h5 "$out/region.yaml"  # a gigabyte that nobody reads
+rm "$out"/*.surgery "$out"/*.h5 "$out"/{region,hurried}.yaml  # a gigabyte that nobody reads
 
 # One process per mesh, so that the memory of one does not count for the next.
 error_time() {  # REPETITIONS OPTIONS...
@@ -184,6 +220,11 @@ else
   for scenario in paper distension; do
     step "exactness: condensed against the direct posterior, $scenario" exactness "$scenario"
   done
+fi
+if [ "${QUICK:-0}" != 1 ] && command -v ccx >/dev/null; then
+  step "peers: CalculiX on the same mesh and load" peers
+else
+  leave_out "CalculiX beside this: QUICK=1, or no ccx (docker/packages-calculix.txt)"
 fi
 current=summary
 echo

@@ -55,9 +55,9 @@ empty_study() {
 resume_study() {
   local kept
   kept=$(mktemp -d)
-  if [ "$2" = 1 ]; then cp "$1"/rows-*.csv "$kept" 2>/dev/null || true; fi
+  if [ "$2" = 1 ]; then cp "$1"/{rows,outlines}-*.csv "$kept" 2>/dev/null || true; fi
   empty_study "$1"
-  cp "$kept"/rows-*.csv "$1" 2>/dev/null || true
+  cp "$kept"/*.csv "$1" 2>/dev/null || true
   rm -rf "$kept"
   BRAINSHIFT_STUDY_DIR=$(realpath "$1")
   export BRAINSHIFT_STUDY_DIR

@@ -62,13 +62,19 @@ Status write_mesh(const BrainModel& model, const fem::MaterialMap& tissue, const
   return out.close();
 }
 
-Status write_tissue(const fem::MaterialMap& tissue, const fs::path& folder) {
+Status write_tissue(const fem::MaterialMap& tissue, Tissue kind_of_tissue, const fs::path& folder) {
   Include out(folder, "tissue.inp");
   for (std::size_t kind = 0; kind < tissue.materials.size(); ++kind) {
     const auto [lambda, shear] = tissue.materials[kind].elastic;
     out.line("*MATERIAL, NAME=TISSUE{}", kind);
-    out.line("*HYPERELASTIC, NEO HOOKE");
-    out.line("{:.12g}, {:.12g}", 0.5 * shear, 2.0 / (lambda + 2.0 / 3.0 * shear));
+    if (kind_of_tissue == Tissue::kLinear) {
+      out.line("*ELASTIC");
+      out.line("{:.12g}, {:.12g}", shear * (3.0 * lambda + 2.0 * shear) / (lambda + shear),
+               0.5 * lambda / (lambda + shear));
+    } else {
+      out.line("*HYPERELASTIC, NEO HOOKE");
+      out.line("{:.12g}, {:.12g}", 0.5 * shear, 2.0 / (lambda + 2.0 / 3.0 * shear));
+    }
     out.line("*EXPANSION");
     out.line("1.0");
     out.line("*SOLID SECTION, ELSET=TISSUE{0}, MATERIAL=TISSUE{0}", kind);
@@ -141,12 +147,12 @@ Status write_swelling(const VecX& volume_strain, const fs::path& folder) {
 }  // namespace
 
 Status write_deck(const client::TruthBrain& brain, const contact::PenaltyContact& contact,
-                  const DeckLoad& load, const fs::path& folder) {
+                  const DeckLoad& load, const fs::path& folder, Tissue kind_of_tissue) {
   if (brain.elsewhere) return invalid("CalculiX deck: of the case's own mesh alone");
   const auto tissue = contact::tissue_map(brain.model, brain.config.material);
   if (!tissue) return tl::unexpected(tissue.error());
   for (const Status& ok :
-       {write_mesh(brain.model, *tissue, folder), write_tissue(*tissue, folder),
+       {write_mesh(brain.model, *tissue, folder), write_tissue(*tissue, kind_of_tissue, folder),
         write_held(brain.model, folder), write_contact(brain.model, contact, folder),
         write_load(load.forces, folder), write_swelling(load.volume_strain, folder)}) {
     if (!ok) return ok;

@@ -24,6 +24,11 @@
 
 namespace brainshift::evidence {
 
+enum class Tissue {
+  kNeoHookean,
+  kLinear,  // the case's material itself, for a deck without NLGEOM
+};
+
 struct DeckLoad {
   Points forces;       // 3 x nodes, N
   VecX volume_strain;  // of each node, > -1
@@ -33,7 +38,8 @@ struct DeckLoad {
 // exist. contact: of the brain's forward model. kInvalidArgument: the brain is solved for on
 // another mesh. kWriteFailed names the file. Errors of tissue_map.
 Status write_deck(const client::TruthBrain& brain, const contact::PenaltyContact& contact,
-                  const DeckLoad& load, const std::filesystem::path& folder);
+                  const DeckLoad& load, const std::filesystem::path& folder,
+                  Tissue tissue = Tissue::kNeoHookean);
 
 // Displacements that CalculiX printed (*NODE PRINT, U): the last block of the .dat file. 3 x nodes,
 // mm. kNotFound: no such file, or it has no displacements; kInvalidArgument names the line that is

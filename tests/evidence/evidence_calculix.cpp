@@ -4,9 +4,14 @@
 //   write  the includes of calculix/patient.inp for the twin of one of the paper's patients, with
 //          the load of its consistency truth
 //   read   what CalculiX printed, as a table beside nodes.csv; says how far it lies from that truth
+// For `make bench` too (peers.csv): forward.csv has how long the twin's own forward model takes for
+// the same forces, apart.csv how far CalculiX lies from it.
+#include <fmt/format.h>
+
 #include <CLI/CLI.hpp>
 #include <cstdio>
 #include <filesystem>
+#include <fstream>
 #include <memory>
 #include <string>
 #include <utility>
@@ -14,6 +19,7 @@
 #include "client/tools/twin/load.hpp"
 #include "client/tools/twin/truth_load.hpp"
 #include "common/anatomy/brain_model_builder.hpp"
+#include "common/core/stopwatch.hpp"
 #include "common/io/config/config_file.hpp"
 #include "common/linalg/openblas.hpp"
 #include "tests/benchmarks/bench_head.hpp"
@@ -31,6 +37,7 @@ struct Arguments {
   fs::path cases = BRAINSHIFT_CASES, folder = ".";
   int patient = 1;
   double thousand_nodes = 18.0;
+  bool linear = false;
 };
 
 struct Twin {
@@ -79,13 +86,35 @@ Result<Twin> make_twin(const Arguments& arguments) {
   return Twin{std::move(*played), std::move(load), truth.displacement};
 }
 
+Status write_line(const fs::path& file, const std::string& heading, double first, double second) {
+  std::ofstream out(file);
+  out << fmt::format("{}\n{:.6g},{:.6g}\n", heading, first, second);
+  out.close();
+  if (out) return {};
+  return fail(ErrorCode::kWriteFailed, file.string() + ": cannot be written");
+}
+
+// Assembly and factorisation, and contact for these forces from the empty set; seconds.
+Status time_forward(const Twin& twin, const fs::path& file) {
+  const Stopwatch factorising;
+  const auto forward = client::truth_forward(twin.played->brain);
+  if (!forward) return tl::unexpected(forward.error());
+  const double factor_s = 1e-3 * factorising.milliseconds();
+  client::TruthSolver solver(*forward);
+  const Stopwatch solving;
+  if (auto solved = solver.solve(twin.load.forces); !solved) return tl::unexpected(solved.error());
+  return write_line(file, "factor_s,solve_s", factor_s, 1e-3 * solving.milliseconds());
+}
+
 Status write(const Arguments& arguments) {
   const auto twin = make_twin(arguments);
   if (!twin) return tl::unexpected(twin.error());
   const client::TruthBrain& brain = twin->played->brain;
-  if (Status ok = write_deck(brain, twin->played->forward.contact(), twin->load, arguments.folder);
+  if (Status ok = write_deck(brain, twin->played->forward.contact(), twin->load, arguments.folder,
+                             arguments.linear ? Tissue::kLinear : Tissue::kNeoHookean);
       !ok)
     return ok;
+  if (Status ok = time_forward(*twin, arguments.folder / "forward.csv"); !ok) return ok;
   if (Status ok = write_points(brain.model.mesh.nodes, arguments.folder / "nodes.csv"); !ok) {
     return ok;
   }
@@ -106,6 +135,11 @@ Status read(const Arguments& arguments) {
       "patient %d: motion %.3f mm on average, %.3f mm at most; CalculiX differs by %.3f mm on "
       "average, %.3f mm at most\n",
       arguments.patient, moved.mean(), moved.maxCoeff(), apart.mean(), apart.maxCoeff());
+  if (Status ok = write_line(arguments.folder / "apart.csv", "mean_mm,max_mm", apart.mean(),
+                             apart.maxCoeff());
+      !ok) {
+    return ok;
+  }
   return write_points(*u,
                       arguments.folder / ("patient-" + std::to_string(arguments.patient) + ".csv"));
 }
@@ -135,6 +169,7 @@ int main(int argc, char** argv) {
   write->add_option("--thousand-nodes", arguments.thousand_nodes, "size of the mesh")
       ->capture_default_str()
       ->check(CLI::Range(1.0, 1000.0));
+  write->add_flag("--linear", arguments.linear, "linear elastic tissue: for a deck without NLGEOM");
   return surgeries::run_study(app, argc, argv, [&] {
     return write->parsed() ? evidence::write(arguments) : evidence::read(arguments);
   });

@@ -7,6 +7,7 @@
                                      NAME@KERNEL
     stages.csv                       bench_update: where the time of an update goes
     scenes.csv                       bench_scenes: what leaving out parts saves and costs
+    peers.csv                        another code on the same mesh and load, forward
     facts.csv                        name,value: what the script measured itself
     left_out.csv                     what the script did not run, a line each
     prepare.json, prepare-100k.json  `brainshiftd prepare --json`; with edges for 100 thousand nodes
@@ -121,6 +122,7 @@ class Results:
         self.stages = self._one("stages.csv", ("surgery", "stage", "over_tsolve"))
         self.scenes = self._one("scenes.csv", ("scenario", "left_out", "active", "largest_mm", "difference_mm",
                                                "estimate_mm", "invert_ms", "rebuild_ms"))
+        self.peers = self._one("peers.csv", ("code", "seconds", "mean_mm", "max_mm"))
         self.left_out = self._lines("left_out.csv")
         self.machine = (self._lines("machine.txt") or [""])[0]
         self.runs, self.latency_ms = {}, {}
@@ -176,10 +178,10 @@ class Results:
                  and rank in (None, one.rank)]
         return max(there, key=lambda one: one.rank, default=None)
 
-    def over_tsolve(self, name):
-        """The median latency in units of the solve of the same report."""
+    def over_tsolve(self, name, percent="p50"):
+        """A percentile of the latency, the median, in units of the solve of the same report."""
         run = self.runs.get(name)
-        return number_at(run, "latency_ms", "p50") / number_at(run, "full_solve_ms")
+        return number_at(run, "latency_ms", percent) / number_at(run, "full_solve_ms")
 
     def active(self, name):
         """Slaves that press at the end; 0 when nothing is known."""
@@ -194,8 +196,8 @@ def _replay(folder, name):
 def _updates(results, folder, suffix):
     kernel = f", BLAS kernel {suffix[1:]}" if suffix else ""
 
-    def median(what, name, bound, contact):
-        check = at_most(f"{what}, p50 / t_solve{kernel}", results.over_tsolve(name + suffix), bound, "",
+    def median(what, name, bound, contact, percent="p50"):
+        check = at_most(f"{what}, {percent} / t_solve{kernel}", results.over_tsolve(name + suffix, percent), bound, "",
                         _replay(folder, name))
         check.holds = check.holds and (results.active(name + suffix) > 0) == contact
         return check
@@ -211,15 +213,27 @@ def _updates(results, folder, suffix):
             median("the same, region of 40 mm about the tumour", "region", 0.3, True),
             cold,
             median("update without contact", "no-contact", 0.2, False),
-            median("three sources, warm", "joint-sag", 1.0, True)]
+            median("three sources, warm", "joint-sag", 1.0, True),
+            median("swelling that presses the brain on the skull, warm", "distension", 2.5, True),
+            median("sag, swelling and shrinkage, three sources, warm", "joint-mixed", 1.5, True),
+            median("the same", "joint-mixed", 3.0, True, "p95")]
+
+
+def _deadline(results, folder):
+    """Of the updates that take longest, with a deadline of 100 ms: all of a session, the first too."""
+    names = [name for name in results.runs if name.endswith("-100ms")]
+    longest = [max(number_at(results.runs[name], "cold_ms"), number_at(results.runs[name], "latency_ms", "max"))
+               for name in names]
+    return at_most("longest update with a deadline of 100 ms, joint-mixed and distension",
+                   max(longest) if len(names) == 2 else math.nan, 120.0, "ms", _replay(folder, "distension"))
 
 
 def _tail(results, folder):
     latency = results.latency_ms.get("sag-progress", [])
     value = percentile(latency, 99.0) / percentile(latency, 50.0)
     # The first update of the session is not among them.
-    return Check("p99 over 2,000 different updates / p50", value, "<= 2.5",
-                 value <= 2.5 and len(latency) + 1 >= UPDATES_FOR_TAIL, _replay(folder, "sag-progress"))
+    return Check("p99 over 2,000 different updates / p50", value, "<= 2",
+                 value <= 2.0 and len(latency) + 1 >= UPDATES_FOR_TAIL, _replay(folder, "sag-progress"))
 
 
 def _paper(results, folder, method, bound, prior):
@@ -301,8 +315,9 @@ def _growth(results, folder):
 def checks(results, folder):
     """folder: for the commands."""
     return [*_updates(results, folder, ""), *_updates(results, folder, "@Haswell"), _tail(results, folder),
+            _deadline(results, folder),
             *(_paper(results, folder, method, bound, prior) for prior in ("case", "paper")
-              for method, bound in (("paper", 700.0), ("paper-woodbury", 200.0))),
+              for method, bound in (("paper", 3000.0), ("paper-woodbury", 700.0))),
             *_exactness(results, folder), *_preparation(results, folder), *_large(results, folder),
             _scenes(results, folder), _coverage(results, folder), _growth(results, folder)]
 
@@ -351,6 +366,13 @@ def _scene_table(results):
                      for row in results.scenes])
 
 
+def _peer_table(results):
+    """Times, and how far displacements lie from those of the forward model here."""
+    return markdown(("code", "time s", "mean difference mm", "largest mm"),
+                    [(row["code"], *(cell(row.number(one)) for one in ("seconds", "mean_mm", "max_mm")))
+                     for row in results.peers])
+
+
 def _mesh_table(results):
     rows = []
     for row in results.meshes:
@@ -381,6 +403,9 @@ def tables(results, all_checks):
             ("Where the time of an update goes",
              ("Medians in units of t_solve, in one process without messages.", ""), _stage_table(results)),
             ("What leaving out parts of a scene saves and costs", (), _scene_table(results)),
+            *([("Another code on the same mesh, forces and contact, forward",
+               ("Sag of patient 1, about 18 thousand nodes; a row for the part of the forward model here that waits for no load, and "
+                "one for the other.", ""), _peer_table(results))] if len(results.peers) else []),
             ("Growth with the mesh", (), _mesh_table(results)),
             ("Methods", ("Times are over n repetitions, errors over those repetitions that all methods of a mesh "
                          "and scenario have.", ""), _method_table(results))):

@@ -50,13 +50,17 @@ class Deck : public testing::Test {
     load_ = Points::Zero(3, model_.mesh.num_nodes());
     load_(2, 7) = -0.25;
     load_(0, 0) = 1e-3;
-    auto brain =
-        value_or_fail(client::truth_brain(model_, config_, *client::find_scenario("paper-icp"), 1));
-    auto forward = value_or_fail(client::truth_forward(brain));
+    brain_ = std::make_unique<client::TruthBrain>(value_or_fail(
+        client::truth_brain(model_, config_, *client::find_scenario("paper-icp"), 1)));
+    auto forward = value_or_fail(client::truth_forward(*brain_));
     forward_ = std::make_unique<contact::ForwardModel>(std::move(forward));
+    write(Tissue::kNeoHookean);
+  }
+  void write(Tissue tissue) {
     VecX strain = VecX::Zero(load_.cols());
     strain[4] = 0.331;
-    const Status ok = write_deck(brain, forward_->contact(), {load_, strain}, folder_.path());
+    const Status ok =
+        write_deck(*brain_, forward_->contact(), {load_, strain}, folder_.path(), tissue);
     EXPECT_TRUE(ok) << ok.error().message;
   }
   auto blocks(const char* file) const { return blocks_of(folder_.path() / file); }
@@ -64,6 +68,7 @@ class Deck : public testing::Test {
   BrainModel model_ = test_support::toy_patient(4);
   CaseConfig config_ = test_support::toy_config();
   Points load_;
+  std::unique_ptr<client::TruthBrain> brain_;
   std::unique_ptr<contact::ForwardModel> forward_;
   test_support::TemporaryFolder folder_;
 };
@@ -115,6 +120,17 @@ TEST_F(Deck, HasTheForcesAndTheModuliOfTheCase) {
   EXPECT_NEAR(2.0 * std::stod(written[0][0]), elastic.shear, 1e-9 * elastic.shear);
   const double bulk = elastic.lambda + 2.0 * elastic.shear / 3.0;
   EXPECT_NEAR(2.0 / std::stod(written[0][1]), bulk, 1e-9 * bulk);
+}
+
+TEST_F(Deck, HasYoungsModulusAndPoissonsRatioOfLinearTissue) {
+  write(Tissue::kLinear);
+  const auto tissue = blocks("tissue.inp");
+  EXPECT_EQ(tissue.count("*HYPERELASTIC, NEO HOOKE"), 0u);
+  const Cells& written = tissue.at("*ELASTIC")[0];
+  const Material& material = config_.material;
+  EXPECT_NEAR(std::stod(written[0]),
+              2e-6 * material.shear_modulus_pa * (1.0 + material.poisson_ratio), 1e-12);
+  EXPECT_NEAR(std::stod(written[1]), material.poisson_ratio, 1e-9);
 }
 
 // 1.1^3 = 1.331. A temperature of 1 stretches tissue by its own length.
