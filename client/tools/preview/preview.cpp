@@ -21,10 +21,12 @@ constexpr double kMargin_mm = 12.0;
 constexpr double kSlice_px_per_mm = 4.0;
 
 const Stroke kTumour{palette::kOrange, 5, 0.0};
-const Stroke kSeptum{palette::kGreen, 5, 0.0};
-const Stroke kVentricle{palette::kVermillion, 4, 0.0};
+const Stroke kSeptum{meaning::kSeptum, 5, 0.0, 2};
+const Stroke kVentricle{meaning::kVentricle, 4, 0.0};
 const Stroke kFluidPlane{palette::kBlue, 4, 0.0};
 const Stroke kSlavePlane{palette::kBlue, 4, 12.0};
+
+const LegendEntry kPlainBrain{"brain", {palette::kPale, 5, 0.0}};
 
 struct RoleStyle {
   NodeRole role;
@@ -47,6 +49,15 @@ NodeRole role_of_triangle(const CaseView& view, int triangle) {
     return view.roles[static_cast<std::size_t>(view.brain.triangles(k, triangle))];
   };
   return corner(1) == corner(2) ? corner(1) : corner(0);
+}
+
+// Precondition: roles.
+bool shows_role(const SurfaceView& picture, const CaseView& view, NodeRole role) {
+  for (std::size_t v = 0; v < view.roles.size(); ++v) {
+    if (view.roles[v] != role) continue;
+    if (picture.shows(view.brain.vertices.col(static_cast<Eigen::Index>(v)))) return true;
+  }
+  return false;
 }
 
 TriangleSurface part_with_role(const CaseView& view, NodeRole role) {
@@ -83,15 +94,6 @@ SliceWindow window_of(const CaseView& view, Plane plane, const Vec3& through) {
   return window;
 }
 
-void add_role_legend(const CaseView& view, Sheet& sheet) {
-  if (view.roles.empty()) {
-    if (view.brain.num_vertices() > 0) sheet.legend.push_back({"brain", {palette::kPale, 5, 0.0}});
-    return;
-  }
-  for (const RoleStyle& style : kRoles)
-    sheet.legend.push_back({style.name, {style.colour, 8, 0.0}});
-}
-
 std::string problem_text(const CaseView& view) {
   return view.problems.empty() ? std::string() : "CANNOT BE PREPARED: " + view.problems.front();
 }
@@ -106,7 +108,9 @@ std::vector<cv::Scalar> triangle_colours(const CaseView& view) {
   return colours;
 }
 
-SurfaceView surface_from(const CaseView& view, const Vec3& towards) {
+// Adds a panel, and to the legend what can be seen in it.
+void add_surface(const CaseView& view, Sheet& sheet, const std::string& title,
+                 const Vec3& towards) {
   const TriangleSurface& bounds = shown(view);
   const Vec3 low = bounds.vertices.rowwise().minCoeff();
   const Vec3 high = bounds.vertices.rowwise().maxCoeff();
@@ -114,19 +118,30 @@ SurfaceView surface_from(const CaseView& view, const Vec3& towards) {
   point.half_width_mm = 0.5 * (high - low).norm() / std::sqrt(2.0) + kMargin_mm;
   SurfaceView picture(point);
   picture.draw_surface(view.brain, triangle_colours(view));
+  for (const RoleStyle& style : kRoles) {
+    if (view.roles.empty()) break;
+    if (shows_role(picture, view, style.role)) {
+      name_in_legend(sheet, {style.name, {style.colour, 8, 0.0}});
+    }
+  }
+  if (view.roles.empty() && view.brain.num_vertices() > 0) name_in_legend(sheet, kPlainBrain);
   picture.draw_through(view.tumour, palette::kOrange, 0.75);
+  if (view.tumour.num_triangles() > 0) {
+    name_in_legend(sheet, {"tumour", {palette::kOrange, 10, 0.0}});
+  }
   if (!view.roles.empty()) {
     const Vec3 gravity = view.config.gravity_direction.normalized();
-    for (const auto& [depth, stroke] : {std::pair{view.fluid_plane_depth_mm, kFluidPlane},
-                                        std::pair{view.slave_plane_depth_mm, kSlavePlane}}) {
+    for (const auto& [depth, entry] :
+         {std::pair{view.fluid_plane_depth_mm, LegendEntry{"fluid plane", kFluidPlane}},
+          std::pair{view.slave_plane_depth_mm, LegendEntry{"second plane", kSlavePlane}}}) {
       for (const auto& line : section_polylines(view.brain, gravity, depth)) {
-        picture.draw_on_surface(line, stroke);
+        if (picture.draw_on_surface(line, entry.stroke)) name_in_legend(sheet, entry);
       }
     }
   }
   picture.draw_axes();
   picture.draw_gravity(view.config.gravity_direction.normalized());
-  return picture;
+  sheet.panels.push_back({title, picture.image()});
 }
 
 namespace fs = std::filesystem;
@@ -145,26 +160,25 @@ cv::Mat slices_picture(const CaseView& view, const Vec3& through, const std::str
   sheet.title = "Case " + view.config.case_id + ": planes through the " + place;
   sheet.subtitle = problem_text(view);
   if (sheet.subtitle.empty()) sheet.subtitle = "at " + place_text(through) + "; radiological view";
-  add_role_legend(view, sheet);
-  sheet.legend.push_back({"tumour", kTumour});
-  if (view.septa.num_triangles() > 0) sheet.legend.push_back({"falx, tentorium", kSeptum});
-  if (view.ventricles.num_triangles() > 0) sheet.legend.push_back({"ventricles", kVentricle});
   for (const auto& [plane, name, letter] :
        {std::tuple{Plane::kAxial, "axial", "S"}, std::tuple{Plane::kCoronal, "coronal", "A"},
         std::tuple{Plane::kSagittal, "sagittal", "R"}}) {
     const SliceWindow window = window_of(view, plane, through);
     SlicePanel panel(window);
     if (view.background) panel.draw_mri(*view.background, 0.8);
+    const auto draw = [&](const TriangleSurface& surface, const LegendEntry& entry) {
+      if (panel.draw_section(surface, entry.stroke)) name_in_legend(sheet, entry);
+    };
     if (view.roles.empty()) {
-      panel.draw_section(view.brain, {palette::kPale, 4, 0.0});
+      draw(view.brain, kPlainBrain);
     } else {
       for (const RoleStyle& style : kRoles) {
-        panel.draw_section(part_with_role(view, style.role), {style.colour, 5, 0.0});
+        draw(part_with_role(view, style.role), {style.name, {style.colour, 5, 0.0}});
       }
     }
-    panel.draw_section(view.septa, kSeptum);
-    panel.draw_section(view.ventricles, kVentricle);
-    panel.draw_section(view.tumour, kTumour);
+    draw(view.ventricles, {"ventricles", kVentricle});
+    draw(view.septa, {"falx, tentorium", kSeptum});
+    draw(view.tumour, {"tumour", kTumour});
     panel.draw_orientation(20.0);
     panel.draw_gravity(view.config.gravity_direction.normalized());
     sheet.panels.push_back(
@@ -183,19 +197,12 @@ cv::Mat surface_picture(const CaseView& view) {
   if (sheet.subtitle.empty())
     sheet.subtitle =
         "the tumour shines through; arrows R, A, S point to the patient's right, front and top";
-  add_role_legend(view, sheet);
-  sheet.legend.push_back({"tumour", {palette::kOrange, 10, 0.0}});
-  if (!view.roles.empty()) {
-    sheet.legend.push_back({"fluid plane", kFluidPlane});
-    sheet.legend.push_back({"second plane", kSlavePlane});
-  }
   const auto opening = opening_of(view);
   const Vec3 side = centre_of(view.tumour).x() < 0.0 ? Vec3(-Vec3::UnitX()) : Vec3(Vec3::UnitX());
-  if (opening)
-    sheet.panels.push_back({"from the opening", surface_from(view, opening->normal).image()});
-  sheet.panels.push_back({side.x() > 0.0 ? "from the patient's right" : "from the patient's left",
-                          surface_from(view, side).image()});
-  sheet.panels.push_back({"from the front", surface_from(view, Vec3::UnitY()).image()});
+  if (opening) add_surface(view, sheet, "from the opening", opening->normal);
+  add_surface(view, sheet, side.x() > 0.0 ? "from the patient's right" : "from the patient's left",
+              side);
+  add_surface(view, sheet, "from the front", Vec3::UnitY());
   return compose(sheet);
 }
 

@@ -17,6 +17,7 @@ struct BoxCase {
   std::string gravity = "[-1, 0, 0]";  // the patient lies on the left side
   std::string brainstem = "[0, 0, -75]";
   double side_mm = 150.0;
+  double stem_radius_mm = 30.0;
 };
 
 inline std::filesystem::path write_box_case(const test_support::TemporaryFolder& folder,
@@ -30,8 +31,8 @@ inline std::filesystem::path write_box_case(const test_support::TemporaryFolder&
           ", semi_axes_mm: [12, 12, 12]}}\ncraniotomy: {centre_mm: " + box.craniotomy +
           ", long_axis_mm: 60, short_axis_mm: 50, "
           "long_axis_direction: [0, 0, 1]}\nbrainstem: {centre_mm: " +
-          box.brainstem + ", radius_mm: 30}\ngravity: {direction: " + box.gravity +
-          "}\ncontact: {slave_depth_mm: 40}\n");
+          box.brainstem + ", radius_mm: " + std::to_string(box.stem_radius_mm) +
+          "}\ngravity: {direction: " + box.gravity + "}\ncontact: {slave_depth_mm: 40}\n");
 }
 
 }  // namespace brainshift::client

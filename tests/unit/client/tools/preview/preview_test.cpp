@@ -29,6 +29,16 @@ TEST(Preview, WritesPicturesAndTheFacts) {
   EXPECT_THAT(io::read_file(folder / "out/preview.txt").value(), HasSubstr("case box"));
 }
 
+TEST(Preview, LegendsNameOnlyWhatIsInThePicture) {
+  const TemporaryFolder folder;
+  const auto aside = write_box_case(folder, {.brainstem = "[0, 56.25, -75]", .stem_radius_mm = 12});
+  value_or_fail(write_preview(aside, folder / "out"));
+  const cv::Mat slices = cv::imread((folder / "out/slices-tumour.png").string());
+  EXPECT_EQ(count_colour(slices, palette::kYellow, whole(slices)), 0);
+  const cv::Mat surface = cv::imread((folder / "out/surface.png").string());
+  EXPECT_EQ(count_colour(surface, palette::kYellow, whole(surface)), 0) << "below the head";
+}
+
 TEST(Preview, DrawsACaseThatCannotBePrepared) {
   const TemporaryFolder folder;
   const auto outside = write_box_case(folder, {.tumour = "[110, -10, 20]"});  // by 23 mm
