@@ -83,6 +83,8 @@ class SlicePanel {
                    double max_mm, bool thin);
   // True where any of it lies in the picture.
   bool draw_section(const TriangleSurface& surface, const Stroke& stroke);
+  // Along the edges of the voxels > 0. True where any of them lies in the picture.
+  bool draw_voxels(const VoxelImage& mask, const Stroke& stroke);
   // The letters of the four sides (R and L, or A and P; A and P, or S and I), and a scale bar of
   // `bar_mm`.
   void draw_orientation(double bar_mm);

@@ -35,17 +35,23 @@ struct CaseView {
   // Along gravity, mm; with roles only.
   double fluid_plane_depth_mm = 0.0;
   double slave_plane_depth_mm = 0.0;
+  // Of a case that cannot be prepared: 1 where the tumour and the brain are of which no surface can
+  // be made, and, where anatomy.labels is to blame, where the brain of that map is.
+  std::optional<VoxelImage> tumour_voxels, brain_voxels, label_voxels;
   // What the builder made of the inputs (anatomy::build_brain_model).
   std::vector<std::string> notes;
   // Each ends the preparation of the case.
   std::vector<std::string> problems;
 };
 
-// Errors: of reading the case and the files that it names. Whatever else is wrong is a problem.
+// Errors: of reading the case, or its MRI, or when none of its images can be read. Whatever else is
+// wrong is a problem.
 Result<CaseView> view_case(const std::filesystem::path& case_file, const Progress& progress = {});
 
 // Mean of a surface's vertices.
 Vec3 centre_of(const TriangleSurface& surface);
+// Of its surface, or else of its voxels. None where there is neither.
+std::optional<Vec3> tumour_centre(const CaseView& view);
 // Where the head is opened: means over the craniotomy's nodes. Without roles, the vertex nearest to
 // craniotomy.centre_mm.
 struct OpeningView {

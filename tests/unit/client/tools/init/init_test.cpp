@@ -96,6 +96,27 @@ TEST_F(FirstCase, FromLabelsCanBePreparedAndSaysWhereEachGuessComesFrom) {
   EXPECT_THAT(view.problems, IsEmpty());
 }
 
+TEST_F(FirstCase, WhoseLabelsOrTumourDoNotServeIsSeenAllTheSame) {
+  value_or_fail(write_first_case(options));
+  const auto append = [this](const std::string& name, const std::string& more) {
+    return folder.write(name, test_support::content_of(options.out) + more);
+  };
+  put("moved.nii", drawn([](const Vec3& x) { return label_at(x - Vec3(0, 30, 0)); }));
+  const CaseView moved =
+      value_or_fail(view_case(append("moved.yaml", "anatomy: {labels: moved.nii, septa: off}\n")));
+  EXPECT_THAT(moved.problems, ElementsAre(HasSubstr("outside the mask of")));
+  ASSERT_TRUE(moved.label_voxels);
+  EXPECT_GT(moved.brain.num_vertices(), 0);
+  EXPECT_GT(moved.tumour.num_vertices(), 0);
+  put("tumour.nii", drawn([](const Vec3& x) {
+        return lesion_at(x) > 0.0F && std::abs(x.z() - 30.0) < 1.5 ? 1.0F : 0.0F;
+      }));
+  const CaseView thin = value_or_fail(
+      view_case(append("thin.yaml", "mesh: {generate: {edge_mm: 9, tumour_edge_mm: 5}}\n")));
+  EXPECT_THAT(thin.problems, ElementsAre(HasSubstr("no voxel has this label")));
+  EXPECT_GT(thin.brain.num_vertices(), 0) << "without a tumour to be fine about";
+}
+
 TEST_F(FirstCase, FromAMaskTakesTheLowestPartNearTheMiddle) {
   options.labels.clear();
   options.brain = folder / "brain.nii";
