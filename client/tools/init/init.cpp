@@ -171,11 +171,10 @@ fs::path beside(const fs::path& out, const std::string& what) {
 Result<VoxelImage> read_labels(const fs::path& path) {
   auto map = io::read_volume(path);
   if (!map) return map;
-  if (Status good = anatomy::check_label_map(*map, "--labels: " + path.string()); !good) {
-    return tl::unexpected(good.error());
-  }
   const auto names = io::label_names_beside(path);
   if (!names) return tl::unexpected(names.error());
+  const Status good = anatomy::check_label_map(*map, "--labels: " + path.string());
+  if (!good) return tl::unexpected(good.error());
   if (names->empty()) return map;
   auto renamed = anatomy::with_freesurfer_numbers(*map, *names);
   if (!renamed) return io::file_error(path, renamed.error());
@@ -313,16 +312,16 @@ void doubt_labels(Draft& draft, const VoxelImage& labels) {
 }
 
 Result<VoxelImage> given_brain(Draft& draft) {
-  const std::string file = draft.options.brain.string();
+  const std::string what = "--brain: " + draft.options.brain.string();
   const auto given = io::read_volume(draft.options.brain);
   if (!given) return tl::unexpected(given.error());
   anatomy::Notes notes;
-  auto mask = anatomy::brain_mask(*given, file, &notes);
+  auto mask = anatomy::brain_mask(*given, what, &notes);
   if (!mask) return mask;
   draft.about_brain =
       fmt::format("Given; {:.0f} cc.", geometry::mask_centre(*mask).volume_mm3 / kMm3PerCc);
   for (const std::string& note : notes) {
-    draft.about_brain += " " + note.substr(file.size() + 2) + ".";
+    draft.about_brain += " " + note.substr(what.size() + 2) + ".";
   }
   return mask;
 }

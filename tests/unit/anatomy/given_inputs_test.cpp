@@ -106,6 +106,18 @@ TEST(BrainMask, ANormalisedImageIsNoMask) {
                     HasSubstr("normalised image")));
 }
 
+TEST(BrainMask, AnImageOfTheWholeHeadIsNoBrain) {
+  VoxelImage head = balls({{Vec3::Zero(), 20.0}});
+  head.T_ras_voxel.linear() *= 4.3;  // 2,664 cc
+  EXPECT_GT(sum(value_or_fail(brain_mask(head, "m", nullptr))), 0.0) << "a mask may be as large";
+  int n = 0;
+  for (float& v : head.values) v *= static_cast<float>(1 + n++ % 200);
+  EXPECT_THAT(refused(brain_mask(head, "m", nullptr)),
+              AllOf(HasSubstr("m: is an image of the whole head, not a brain"), HasSubstr("cc")));
+  head.T_ras_voxel.linear() *= 0.95;
+  EXPECT_GT(sum(value_or_fail(brain_mask(head, "m", nullptr))), 0.0);
+}
+
 TEST(BrainMask, RipplesAreNoBrain) {
   const VoxelImage ball = balls({{Vec3::Zero(), 20.0}});
   VoxelImage image = ball;

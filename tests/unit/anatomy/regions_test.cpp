@@ -203,6 +203,10 @@ TEST(Regions, MapsThatCannotGiveWhatIsAskedForAreNamed) {
   EXPECT_THAT(refusal(image), HasSubstr("is no label map: it has the value 0.25"));
   image.label_names = {{2, "Left-Cerebral-White-Matter"}};  // whose numbers round the values
   EXPECT_THAT(refusal(image), HasSubstr("is no label map: it has the value 0.25"));
+  CaseInputs mri = labelled_case();
+  int n = 0;
+  for (float& v : mri.labels->values) v = static_cast<float>(n++ % 997);
+  EXPECT_THAT(refusal(mri), HasSubstr("anatomy.labels = 'labels.nii': is an image, not a label"));
   CaseInputs ready = labelled_case();
   ready.config.mesh = MeshFile{"head.msh"};
   EXPECT_THAT(refusal(ready), HasSubstr("anatomy.labels: needs a mesh that is generated"));

@@ -199,6 +199,24 @@ TEST_F(FirstCase, LabelsThatAreNoWholeNumbersAreRefused) {
 }
 
 // Ventricles that are as bright as white matter, because the map lies 30 mm beside the MRI.
+TEST_F(FirstCase, AnMriIsNeitherLabelMapNorBrain) {
+  // A head of 3,400 cc with the grey values of tissue.
+  put("t1.nii", drawn([](const Vec3& x) {
+        const double r = x.cwiseQuotient(Vec3(85, 100, 95)).norm();
+        return r < 1.0 ? 100.0F + std::floor(400.0F * static_cast<float>(r)) : 0.0F;
+      }));
+  options.labels = folder / "t1.nii";
+  EXPECT_THAT(refusal(), AllOf(HasSubstr("--labels: "), HasSubstr("t1.nii: is an image, not a "),
+                               HasSubstr("more than 60 different values")));
+  folder.write("t1.tsv", "index\tname\n200\tBrain-Stem\n");
+  EXPECT_THAT(refusal(), HasSubstr("is an image, not a label map"));
+  options.labels.clear();
+  options.brain = folder / "t1.nii";
+  EXPECT_THAT(refusal(), AllOf(HasSubstr("--brain: "), HasSubstr("t1.nii: is an image of the "),
+                               HasSubstr("not a brain: 33")));
+  EXPECT_FALSE(std::filesystem::exists(options.out));
+}
+
 TEST_F(FirstCase, ALabelMapThatDoesNotLieOnTheMriIsDoubted) {
   const auto ventricle = [](const Vec3& x) { return (x - Vec3(10, 0, 10)).norm() < 20.0; };
   const auto map = drawn([&](const Vec3& x) { return ventricle(x) ? 43.0F : label_at(x); });
