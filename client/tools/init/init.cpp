@@ -206,6 +206,16 @@ std::string about_series(const io::DicomSeries& series) {
   return text + ".";
 }
 
+Points voxels_of(const std::vector<anatomy::Focus>& foci) {
+  std::vector<Vec3> all;
+  for (const anatomy::Focus& focus : foci) {
+    for_each_of(focus.mask, [&all](const Vec3& x) { all.push_back(x); });
+  }
+  Points voxels(3, static_cast<Eigen::Index>(all.size()));
+  for (Eigen::Index i = 0; i < voxels.cols(); ++i) voxels.col(i) = all[static_cast<std::size_t>(i)];
+  return voxels;
+}
+
 Status guess_tumour(Draft& draft, const VoxelImage& brain) {
   const InitOptions& options = draft.options;
   MriIdentity mri;
@@ -230,7 +240,11 @@ Status guess_tumour(Draft& draft, const VoxelImage& brain) {
                     "the background, or the brain?",
                     options.tumour.string(), mm3 / kMm3PerCc, given->why, brain_mm3 / kMm3PerCc));
   }
+  const auto doubt =
+      place_in_brain(voxels_of(*foci), brain, "--tumour: " + options.tumour.string());
+  if (!doubt) return tl::unexpected(doubt.error());
   draft.about_tumour = fmt::format("{:.2f} cc ({}).", mm3 / kMm3PerCc, given->why);
+  if (!doubt->empty()) draft.about_tumour += " LOOK AGAIN: " + *doubt + ".";
   for (const std::string& note : given->notes) draft.about_tumour += " " + note + ".";
   for (const std::string& note : notes) {
     draft.about_tumour += " " + note.substr(options.tumour.string().size() + 2) + ".";

@@ -21,6 +21,7 @@ namespace {
 
 using test_support::TemporaryFolder;
 using testing::AllOf;
+using testing::Contains;
 using testing::ElementsAre;
 using testing::HasSubstr;
 using testing::IsEmpty;
@@ -159,6 +160,22 @@ TEST_F(FirstCase, TheBackgroundIsNoTumour) {
   EXPECT_THAT(refusal(), HasSubstr("is it the background, or the brain?"));
   put("tumour.nii", drawn([](const Vec3& x) { return lesion_at(x) == 1.0F ? 1e30F : 0.0F; }));
   EXPECT_THAT(refusal(), HasSubstr("is no label map: it has the value 1e+30"));
+}
+
+TEST_F(FirstCase, ATumourOutsideTheBrainIsRefusedAndOneThatSticksOutIsDoubted) {
+  const auto ball_at = [this](const Vec3& centre) {
+    put("tumour.nii",
+        drawn([&](const Vec3& x) { return (x - centre).norm() < 12.0 ? 1.0F : 0.0F; }));
+  };
+  ball_at(Vec3(85, 0, 0));  // the brain ends at 70
+  EXPECT_THAT(refusal(),
+              AllOf(HasSubstr("--tumour: "), HasSubstr("tumour.nii: 100 % of the tumour "
+                                                       "lie outside the brain, up to 2")));
+  EXPECT_FALSE(std::filesystem::exists(options.out));
+  ball_at(Vec3(66, 0, 0));
+  EXPECT_THAT(value_or_fail(write_first_case(options)).guesses,
+              Contains(AllOf(HasSubstr("tumour: "), HasSubstr("LOOK AGAIN"),
+                             HasSubstr("more than 3 mm are not prepared"))));
 }
 
 TEST_F(FirstCase, AVolumeThatIsThereIsNeverReplacedAndNothingIsLeftBehind) {
