@@ -269,6 +269,9 @@ TEST_F(RegisterPatient, ATargetOutsideOfTheHeadIsRefused) {
   EXPECT_THAT(refusal(), AllOf(HasSubstr("--target (46.0, -47.0, 900.0) lies "),
                                HasSubstr("from the middle of the fiducials in the image"),
                                HasSubstr("must lie within 300 mm")));
+  options.target = Vec3(0.046, -0.047, 0.009);
+  EXPECT_THAT(refusal(), HasSubstr("--target (0.046, -0.047, 0.009) lies within 0.1 mm of the "
+                                   "origin; in metres it would be (46.0, -47.0, 9.0) mm"));
 }
 
 TEST_F(RegisterPatient, PosesThatTheTrackerLostAreLeftOut) {
