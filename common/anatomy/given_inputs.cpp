@@ -29,6 +29,8 @@ constexpr std::size_t kFewValues = 16;
 constexpr double kTop = 0.9, kLeastTop = 1.0 / 3.0;
 constexpr double kLargestRipple = 0.05;
 constexpr double kLargestLostPart = 0.1;
+constexpr double kLittle = 0.1;
+constexpr const char* kNothingToDo = "nothing to do";
 // A head has 3,000 to 5,000 cc, the largest brains 1,900.
 constexpr double kLargestBrain_cc = 2500.0;
 constexpr std::size_t kManyLabels = 60;
@@ -98,6 +100,13 @@ std::string place_text(const Vec3& x) {
 void add_note(Notes* notes, const std::string& note) {
   if (notes != nullptr) notes->push_back(note);
 }
+
+std::string what_to_do(double share, const char* place) {
+  if (share <= kLittle) return std::string("; ") + kNothingToDo;
+  return fmt::format("; look at the {} in the pictures, and at the labels there", place);
+}
+
+bool asks_nothing(const std::string& note) { return note.ends_with(kNothingToDo); }
 
 Status check_extent(const Vec3& size_mm, const std::string& what, double least_mm, double most_mm) {
   const double extent = size_mm.maxCoeff();
@@ -358,8 +367,11 @@ Result<std::vector<Focus>> tumour_foci(const VoxelImage& image, const std::vecto
     add_note(notes, fmt::format("{}: the tumour has {} parts: {}", what, foci.size(), told));
   }
   if (specks > 0) {
-    add_note(notes, fmt::format("{}: specks below {:g} cc are left out: {}, {:.3f} cc in all", what,
-                                kSmallestFocus_mm3 / kMm3PerCc, specks, speck_mm3 / kMm3PerCc));
+    double all_mm3 = speck_mm3;
+    for (const Focus& focus : foci) all_mm3 += focus.volume_mm3;
+    add_note(notes, fmt::format("{}: specks below {:g} cc are left out: {}, {:.3f} cc in all{}",
+                                what, kSmallestFocus_mm3 / kMm3PerCc, specks, speck_mm3 / kMm3PerCc,
+                                what_to_do(speck_mm3 / all_mm3, "tumour")));
   }
   return foci;
 }

@@ -16,6 +16,12 @@ namespace brainshift::anatomy {
 using Notes = std::vector<std::string>;
 void add_note(Notes* notes, const std::string& note);
 
+// The end of a note about a `share` (0 to 1) of something that is left out: up to a tenth
+// "; nothing to do", else "; look at the PLACE in the pictures, and at the labels there".
+std::string what_to_do(double share, const char* place);
+// Whether a note ends so that nobody need act.
+bool asks_nothing(const std::string& note);
+
 // kInvalidArgument unless the largest side of a box lies between the bounds; the sentence names
 // metres or micrometres where those would fit.
 Status check_extent(const Vec3& size_mm, const std::string& what, double least_mm, double most_mm);

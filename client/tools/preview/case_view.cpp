@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <iterator>
 #include <map>
 #include <numbers>
 #include <numeric>
@@ -14,6 +15,7 @@
 #include "common/anatomy/brain_labels.hpp"
 #include "common/anatomy/brain_mesh.hpp"
 #include "common/anatomy/brain_model_builder.hpp"
+#include "common/anatomy/given_inputs.hpp"
 #include "common/geometry/closest_point.hpp"
 #include "common/geometry/mask.hpp"
 #include "common/geometry/surface.hpp"
@@ -292,6 +294,8 @@ std::vector<std::string> facts(const CaseView& view) {
                     count(view, NodeRole::kCraniotomy), count(view, NodeRole::kSlave),
                     count(view, NodeRole::kBrainstem), count(view, NodeRole::kFixed)));
   }
+  std::copy_if(view.notes.begin(), view.notes.end(), std::back_inserter(lines),
+               anatomy::asks_nothing);
   return lines;
 }
 
@@ -383,7 +387,9 @@ void doubt_opening(const CaseView& view, const OpeningView& opening,
 }  // namespace
 
 std::vector<std::string> doubts(const CaseView& view) {
-  std::vector<std::string> lines = view.notes;
+  std::vector<std::string> lines;
+  std::remove_copy_if(view.notes.begin(), view.notes.end(), std::back_inserter(lines),
+                      anatomy::asks_nothing);
   if (view.brain.num_vertices() == 0) return lines;
   const double longest = extent_of(view.brain).maxCoeff();
   if (longest < kShortBrain_mm || longest > kLongBrain_mm) {

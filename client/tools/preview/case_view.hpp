@@ -67,7 +67,8 @@ std::string place_text(const Vec3& x_ras);
 // "inferior 0.92, anterior 0.35, left 0.20".
 std::string direction_text(const Vec3& direction);
 
-// What the pictures show, as sentences with figures: sizes, places, distances, angles.
+// What the pictures show, as sentences with figures: sizes, places, distances, angles; and what the
+// builder noted that asks nothing of anybody (anatomy::asks_nothing).
 std::vector<std::string> facts(const CaseView& view);
 
 // How well the brain's surface lies in a T1 MRI: there the brain, 3 mm below the surface, is
@@ -82,7 +83,7 @@ std::optional<MriFit> fit_of_mri(const CaseView& view);
 
 // What is unusual enough for a second look: each a sentence that names the key to look at. A wrong
 // side, a wrong axis and metres for millimetres show here.
-//   what the builder noted: a tumour that sticks out of the brain and is cut
+//   what else the builder noted: a tumour that sticks out of the brain and is cut
 //   tumour and opening on different sides of the brain, each more than 10 mm from its middle
 //   an opening farther than 60 mm from the tumour's surface
 //   an opening that faces down: the brain would sag out of it

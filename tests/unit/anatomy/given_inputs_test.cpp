@@ -106,6 +106,14 @@ TEST(BrainMask, ANormalisedImageIsNoMask) {
                     HasSubstr("normalised image")));
 }
 
+TEST(Notes, SayWhetherThereIsSomethingToDo) {
+  EXPECT_EQ(what_to_do(0.1, "falx"), "; nothing to do");
+  EXPECT_EQ(what_to_do(0.11, "falx"),
+            "; look at the falx in the pictures, and at the labels there");
+  EXPECT_TRUE(asks_nothing("falx of 72 cm2" + what_to_do(0.0, "falx")));
+  EXPECT_FALSE(asks_nothing("falx of 72 cm2" + what_to_do(0.2, "falx")));
+}
+
 TEST(BrainMask, AnImageOfTheWholeHeadIsNoBrain) {
   VoxelImage head = balls({{Vec3::Zero(), 20.0}});
   head.T_ras_voxel.linear() *= 4.3;  // 2,664 cc

@@ -34,7 +34,8 @@ TEST(Misplacement, APlaceInMetresIsNearTheOriginAndMeantInTheHead) {
             "lies within 0.1 mm of the origin; in metres it would be (46.0, -47.0, 9.0) mm");
   EXPECT_EQ(metres_for_millimetres(Vec3(0.2, 0.0, 0.0), in_head), "") << "200 mm is no head";
   EXPECT_EQ(metres_for_millimetres(Vec3::Zero(), in_head), "");
-  EXPECT_EQ(metres_for_millimetres(Vec3(1, -2, 0), in_head), "");
+  const auto anywhere = [](const Vec3&) { return true; };
+  EXPECT_EQ(metres_for_millimetres(Vec3(1, -2, 0), anywhere), "");
 }
 
 }  // namespace

@@ -99,6 +99,13 @@ TEST_F(CaseViewOf, DoubtsSayHowFarACentreIsProjectedAndKnowCentimetres) {
       Contains(AllOf(HasSubstr("mm from the brain's surface"), Not(HasSubstr("centimetres?")))));
 }
 
+TEST_F(CaseViewOf, NotesThatAskNothingAreFactsAndOthersDoubts) {
+  CaseView seen = view();
+  seen.notes = {"falx of 70 cm2; nothing to do", "falx of 7 cm2; look at the falx"};
+  EXPECT_THAT(facts(seen), AllOf(Contains(seen.notes[0]), Not(Contains(seen.notes[1]))));
+  EXPECT_THAT(doubts(seen), AllOf(Contains(seen.notes[1]), Not(Contains(seen.notes[0]))));
+}
+
 // An MRI that is bright in the box, grey around it and black far away.
 VoxelImage head_with_a_brain(const Vec3& centre) {
   VoxelImage mri;
