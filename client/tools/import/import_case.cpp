@@ -59,7 +59,7 @@ Result<std::vector<tracking::ConstantLink>> device_links(const fs::path& device)
 Status check_new(const fs::path& out) {
   std::error_code ignored;
   if (!fs::exists(out, ignored)) return {};
-  return fail(ErrorCode::kWriteFailed, out.string() + ": exists already");
+  return invalid(out.string() + ": exists already");
 }
 
 Result<ImportCase> load_import_case(const fs::path& case_file, const fs::path& model,

@@ -47,7 +47,7 @@ Status check_option(const char* name, double value, double least, double most);
 // io::read_plus_config.
 Result<std::vector<tracking::ConstantLink>> device_links(const std::filesystem::path& device);
 
-// kWriteFailed when `out` exists already.
+// kInvalidArgument when `out` exists already.
 Status check_new(const std::filesystem::path& out);
 
 // Writes a surgery file of observations, as `brainshift replay` plays it.

@@ -354,7 +354,7 @@ TEST_F(RegisterPatient, NamesWhatIsMissingOrTooMuch) {
 
 TEST_F(RegisterPatient, AnExistingFileIsLeftAlone) {
   folder.write("T_ras_reference.txt", "mine");
-  EXPECT_THAT(refusal_of(register_patient(options), ErrorCode::kWriteFailed),
+  EXPECT_THAT(refusal_of(register_patient(options), ErrorCode::kInvalidArgument),
               HasSubstr("exists already"));
 }
 
