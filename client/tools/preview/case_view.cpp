@@ -16,6 +16,7 @@
 #include "common/anatomy/brain_mesh.hpp"
 #include "common/anatomy/brain_model_builder.hpp"
 #include "common/anatomy/given_inputs.hpp"
+#include "common/anatomy/mask_leak.hpp"
 #include "common/geometry/closest_point.hpp"
 #include "common/geometry/mask.hpp"
 #include "common/geometry/surface.hpp"
@@ -181,6 +182,12 @@ Result<CaseView> view_case(const std::filesystem::path& case_file, const Progres
   } else {
     view.problems.push_back(model.error().message);
     take_parts(view, inputs, progress);
+  }
+  if (inputs.brain) {
+    if (const auto mask = anatomy::brain_mask(*inputs.brain, {}, nullptr)) {
+      const anatomy::MaskLeak leak = anatomy::mask_leak(*mask);
+      view.leak_mm3 = leak.volume_mm3, view.leak_centre = leak.centre;
+    }
   }
   if (view.brain.num_vertices() > 0) {
     view.projection_mm = distance_to_surface(config->craniotomy.centre_mm, view.brain);
@@ -399,6 +406,12 @@ std::vector<std::string> doubts(const CaseView& view) {
         longest));
   }
   doubt_volume(view, lines);
+  if (view.leak_mm3 > anatomy::kLeak_mm3) {
+    lines.push_back(fmt::format(
+        "{:.0f} cc of images.brain hang on the rest by a thin neck, at {}: did the mask leak into "
+        "an orbit, the scalp or the skull?",
+        view.leak_mm3 / kMm3PerCc, place_text(view.leak_centre)));
+  }
   doubt_mri(view, lines);
   doubt_projection(view, lines);
   if (const auto opening = opening_of(view)) doubt_opening(view, *opening, lines);

@@ -38,6 +38,9 @@ struct CaseView {
   // Of a case that cannot be prepared: 1 where the tumour and the brain are of which no surface can
   // be made, and, where anatomy.labels is to blame, where the brain of that map is.
   std::optional<VoxelImage> tumour_voxels, brain_voxels, label_voxels;
+  // Of images.brain: what hangs on the rest by a thin neck (anatomy::mask_leak).
+  double leak_mm3 = 0.0;
+  Vec3 leak_centre = Vec3::Zero();
   // What the builder made of the inputs (anatomy::build_brain_model).
   std::vector<std::string> notes;
   // Each ends the preparation of the case.
@@ -90,6 +93,7 @@ std::optional<MriFit> fit_of_mri(const CaseView& view);
 //   craniotomy.centre_mm farther than 10 mm from the surface that it is projected to; centimetres
 //   where ten times the centre lies on it
 //   a brain not between 100 and 220 mm long, or not of 900 to 1900 cc
+//   a mask that has leaked (anatomy::mask_leak: above 5 cc)
 //   a brain that is not in its place in the MRI (fit_of_mri: contrast below 0.2, or more than
 //   0.15 dark)
 //   a brainstem above the brain's centre
