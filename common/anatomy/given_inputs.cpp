@@ -9,6 +9,7 @@
 #include <limits>
 #include <map>
 #include <numeric>
+#include <optional>
 #include <set>
 #include <utility>
 
@@ -28,6 +29,12 @@ constexpr std::size_t kFewValues = 16;
 constexpr double kTop = 0.9, kLeastTop = 1.0 / 3.0;
 constexpr double kLargestRipple = 0.05;
 constexpr double kLargestLostPart = 0.1;
+constexpr double kLittle = 0.1;
+constexpr const char* kNothingToDo = "nothing to do";
+// A head has 3,000 to 5,000 cc, the largest brains 1,900.
+constexpr double kLargestBrain_cc = 2500.0;
+constexpr std::size_t kManyLabels = 60;
+constexpr double kLeastAlike = 0.25;
 
 bool is_whole(float v) { return std::abs(v - std::round(v)) <= kWholeNumber; }
 
@@ -94,6 +101,13 @@ void add_note(Notes* notes, const std::string& note) {
   if (notes != nullptr) notes->push_back(note);
 }
 
+std::string what_to_do(double share, const char* place) {
+  if (share <= kLittle) return std::string("; ") + kNothingToDo;
+  return fmt::format("; look at the {} in the pictures, and at the labels there", place);
+}
+
+bool asks_nothing(const std::string& note) { return note.ends_with(kNothingToDo); }
+
 Status check_extent(const Vec3& size_mm, const std::string& what, double least_mm, double most_mm) {
   const double extent = size_mm.maxCoeff();
   const auto fits = [&](double factor) {
@@ -135,6 +149,13 @@ Result<VoxelImage> brain_mask(const VoxelImage& image, const std::string& what, 
   if (!largest) {
     return fail(largest.error().code, fmt::format("{}: {}", what, largest.error().message));
   }
+  const double cc = geometry::mask_centre(*largest).volume_mm3 / kMm3PerCc;
+  if (cc > kLargestBrain_cc && !is_soft(values) && values.different.size() > kFewValues) {
+    return invalid(fmt::format(
+        "{}: is an image of the whole head, not a brain: {:.0f} cc of it are above 0, with more "
+        "than {} different values; give a mask, or the image without skull and face",
+        what, cc, kFewValues));
+  }
   const geometry::MaskParts parts = geometry::mask_parts(mask);
   if (parts.voxels.size() < 2) return largest;
   std::size_t lost = 0;
@@ -169,13 +190,31 @@ VoxelImage without_sulci(VoxelImage mask, const std::string& what, Notes* notes)
 }
 
 Status check_label_map(const VoxelImage& map, const std::string& what) {
-  for (const float v : map.values) {
-    if (!std::isfinite(v) || (is_whole(v) && std::abs(v) < kLargestLabel)) continue;
-    return invalid(fmt::format(
-        "{}: is no label map: it has the value {:g}{}", what, v,
-        is_whole(v) ? "" : ", no whole number; resample the labels by nearest neighbour"));
+  std::set<float> different;
+  std::optional<float> odd;
+  std::size_t labelled = 0, as_next = 0;
+  for (std::size_t v = 0; v + 1 < map.values.size(); ++v) {
+    const float value = map.values[v];
+    if (!(value > 0.0F)) continue;
+    ++labelled;
+    as_next += value == map.values[v + 1] ? 1 : 0;
+    if (different.size() <= kManyLabels) different.insert(value);
   }
-  return {};
+  for (const float v : map.values) {
+    if (odd || !std::isfinite(v) || (is_whole(v) && std::abs(v) < kLargestLabel)) continue;
+    odd = v;
+  }
+  const double alike = static_cast<double>(as_next) / static_cast<double>(labelled);
+  if (different.size() > kManyLabels && alike < kLeastAlike) {
+    return invalid(fmt::format(
+        "{}: is an image, not a label map: only {:.0f} % of its voxels have the value of the next "
+        "one, with more than {} different values",
+        what, 100.0 * alike, kManyLabels));
+  }
+  if (!odd) return {};
+  return invalid(fmt::format(
+      "{}: is no label map: it has the value {:g}{}", what, *odd,
+      is_whole(*odd) ? "" : ", no whole number; resample the labels by nearest neighbour"));
 }
 
 std::string listed_labels(const VoxelImage& image) {
@@ -328,8 +367,11 @@ Result<std::vector<Focus>> tumour_foci(const VoxelImage& image, const std::vecto
     add_note(notes, fmt::format("{}: the tumour has {} parts: {}", what, foci.size(), told));
   }
   if (specks > 0) {
-    add_note(notes, fmt::format("{}: specks below {:g} cc are left out: {}, {:.3f} cc in all", what,
-                                kSmallestFocus_mm3 / kMm3PerCc, specks, speck_mm3 / kMm3PerCc));
+    double all_mm3 = speck_mm3;
+    for (const Focus& focus : foci) all_mm3 += focus.volume_mm3;
+    add_note(notes, fmt::format("{}: specks below {:g} cc are left out: {}, {:.3f} cc in all{}",
+                                what, kSmallestFocus_mm3 / kMm3PerCc, specks, speck_mm3 / kMm3PerCc,
+                                what_to_do(speck_mm3 / all_mm3, "tumour")));
   }
   return foci;
 }

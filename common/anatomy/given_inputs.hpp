@@ -16,6 +16,12 @@ namespace brainshift::anatomy {
 using Notes = std::vector<std::string>;
 void add_note(Notes* notes, const std::string& note);
 
+// The end of a note about a `share` (0 to 1) of something that is left out: up to a tenth
+// "; nothing to do", else "; look at the PLACE in the pictures, and at the labels there".
+std::string what_to_do(double share, const char* place);
+// Whether a note ends so that nobody need act.
+bool asks_nothing(const std::string& note);
+
 // kInvalidArgument unless the largest side of a box lies between the bounds; the sentence names
 // metres or micrometres where those would fit.
 Status check_extent(const Vec3& size_mm, const std::string& what, double least_mm, double most_mm);
@@ -27,6 +33,8 @@ Status check_extent(const Vec3& size_mm, const std::string& what, double least_m
 //   ripples below 0, of at most a twentieth of the largest value
 //                                      brain above as much; noted
 //   more below 0                       kInvalidArgument: an image (normalised) and no mask
+//   more than 16 different values, and the largest part above 2500 cc
+//                                      kInvalidArgument: an image of the whole head
 // Of several parts the largest counts; the others are noted. kInvalidArgument: a second part of
 // more than a tenth of the volume. kEmptySet: no voxel > 0.
 Result<VoxelImage> brain_mask(const VoxelImage& image, const std::string& what, Notes* notes);
@@ -56,7 +64,9 @@ Result<std::vector<Focus>> tumour_foci(const VoxelImage& image, const std::vecto
 
 // Numbers of labels are far below; what single precision counts to.
 inline constexpr float kLargestLabel = 16777216.0F;
-// kInvalidArgument: a value that is no whole number, or far above any label; the sentence has it.
+// kInvalidArgument, with figures: a value that is no whole number, or far above any label; an
+// image: of more than 60 different values > 0, less than a quarter of the voxels have that of the
+// next one (MRIs of 1 mm: 4 to 23 %; label maps of 1 or 2 mm, 33 to 724 labels: 71 to 93 %).
 Status check_label_map(const VoxelImage& map, const std::string& what);
 
 // "1 (2.10 cc), 4 (0.31 cc)": the labels of an image but 0, with their volumes; at most 20 of

@@ -185,9 +185,13 @@ Status check_map(const VoxelImage& map, const AnatomyConfig& wanted, const Voxel
           if (brain.values.empty() || in_mask(x)) others.values[v] = map.values[v];
         });
     if (const std::string list = listed_labels(others); list != "none") {
+      const double share = brain.values.empty() ? 0.0
+                                                : geometry::mask_centre(others).volume_mm3 /
+                                                      geometry::mask_centre(brain).volume_mm3;
       add_note(notes, fmt::format("{}: not of the brain by anatomy.numbers = {}: {}; where the "
-                                  "brain is, the nearest part takes their place",
-                                  what, word_of(wanted.numbers, kNumbersWords), list));
+                                  "brain is, the nearest part takes their place{}",
+                                  what, word_of(wanted.numbers, kNumbersWords), list,
+                                  what_to_do(share, "brain")));
     }
   }
   const std::pair<bool, std::pair<Structure, const char*>> absent[] = {
@@ -274,7 +278,7 @@ Status check_fit(const VoxelImage& map, const VoxelImage& brain, const std::stri
 
 // Takes a ventricle's label from voxels inside the tumour. `map`: the one of `regions`.
 Status keep_tumour(std::vector<std::uint8_t>& regions, const VoxelImage& map,
-                   const TriangleSurface& tumour, const std::string& what, Notes* notes) {
+                   const TriangleSurface& tumour, Notes* notes) {
   if (std::find(regions.begin(), regions.end(), kVentricleRegion) == regions.end()) return {};
   if (!geometry::is_closed(tumour)) return {};
   const auto index = geometry::ClosestPointIndex::build(tumour);
@@ -291,8 +295,9 @@ Status keep_tumour(std::vector<std::uint8_t>& regions, const VoxelImage& map,
   });
   const double mm3 = static_cast<double>(taken) * std::abs(map.T_ras_voxel.linear().determinant());
   if (mm3 >= 10.0) {
-    add_note(notes, fmt::format("{}: {:.2f} cc of the tumour lie in ventricles; they are tissue",
-                                what, mm3 / 1e3));
+    add_note(notes, fmt::format("anatomy.labels: {:.2f} cc of the tumour lie in ventricles; they "
+                                "are tissue{}",
+                                mm3 / 1e3, what_to_do(0.0, "tumour")));
   }
   return {};
 }
@@ -350,7 +355,7 @@ Result<Regions> Regions::build_from(const CaseInputs& inputs, const VoxelImage& 
     }
     regions[v] = entry->second;
   }
-  if (Status kept_tissue = keep_tumour(regions, cut, tumour, what, notes); !kept_tissue) {
+  if (Status kept_tissue = keep_tumour(regions, cut, tumour, notes); !kept_tissue) {
     return tl::unexpected(kept_tissue.error());
   }
   fill(regions, cut.dims);

@@ -20,6 +20,9 @@ namespace {
 
 using Facet = std::array<int, 3>;
 
+// In notes; errors name the file too.
+constexpr const char* kKey = "anatomy.labels";
+
 std::size_t at(int i) { return static_cast<std::size_t>(i); }
 
 // The tetrahedra that stay.
@@ -45,7 +48,7 @@ ClosedTumour closed_tumour(const TriangleSurface& tumour) {
 }
 
 // Which tetrahedra are taken out.
-std::vector<char> cavities(const TetMesh& mesh, const std::string& what, Notes* notes) {
+std::vector<char> cavities(const TetMesh& mesh, Notes* notes) {
   std::vector<char> outer(at(mesh.num_nodes()), 0);
   const Eigen::Matrix3Xi surface = geometry::boundary_triangles(mesh);
   for (const int n : surface.reshaped()) outer[at(n)] = 1;
@@ -75,30 +78,34 @@ std::vector<char> cavities(const TetMesh& mesh, const std::string& what, Notes* 
   if (touching_mm3 > 0.05 * all_mm3 || small_mm3 > 0.0) {
     add_note(notes, fmt::format("{}: of {:.1f} cc of ventricles in the mesh {:.1f} cc touch the "
                                 "brain's surface and {:.1f} cc lie apart in parts below {:g} cc; "
-                                "they are brain",
-                                what, all_mm3 / 1e3, touching_mm3 / 1e3, small_mm3 / 1e3,
-                                kSmallestVentricle_mm3 / 1e3));
+                                "they are brain{}",
+                                kKey, all_mm3 / 1e3, touching_mm3 / 1e3, small_mm3 / 1e3,
+                                kSmallestVentricle_mm3 / 1e3,
+                                what_to_do((touching_mm3 + small_mm3) / all_mm3, "ventricles")));
   }
   return taken;
 }
 
 // Takes tissue that stands in ventricles and touches no other.
-void take_islands(const TetMesh& mesh, std::vector<char>& taken, const std::string& what,
-                  Notes* notes) {
+void take_islands(const TetMesh& mesh, std::vector<char>& taken, Notes* notes) {
   const std::vector<int> tissue = untaken(taken);
   const geometry::TetComponents parts = geometry::tet_components(mesh.tets(Eigen::all, tissue));
   if (parts.sizes.size() < 2) return;
   const auto brain = std::max_element(parts.sizes.begin(), parts.sizes.end());
   const auto largest = static_cast<int>(brain - parts.sizes.begin());
-  double islands_mm3 = 0.0;
+  double islands_mm3 = 0.0, ventricles_mm3 = 0.0;
+  for (int t = 0; t < mesh.num_tets(); ++t) {
+    ventricles_mm3 += taken[at(t)] ? geometry::tet_volume(mesh, t) : 0.0;
+  }
   for (std::size_t i = 0; i < tissue.size(); ++i) {
     if (parts.component_of_tet[i] == largest) continue;
     taken[at(tissue[i])] = 1;
     islands_mm3 += geometry::tet_volume(mesh, tissue[i]);
   }
   add_note(notes, fmt::format("{}: {} parts of tissue, of {:.2f} cc together, stand in ventricles "
-                              "without touching the brain; they are ventricle",
-                              what, parts.sizes.size() - 1, islands_mm3 / 1e3));
+                              "without touching the brain; they are ventricle{}",
+                              kKey, parts.sizes.size() - 1, islands_mm3 / 1e3,
+                              what_to_do(islands_mm3 / ventricles_mm3, "ventricles")));
 }
 
 // kInvalidArgument: the tumour has lost its tissue to the ventricles.
@@ -130,8 +137,8 @@ std::array<Edge, 3> edges_of(const Facet& f) {
 // facet as a neighbour does.
 geometry::Facets without_teeth_and_islands(geometry::Facets facets, const Points& nodes,
                                            const std::vector<Edge>& rim, const char* name,
-                                           const std::string& what, Notes* notes) {
-  int teeth = 0;
+                                           Notes* notes) {
+  double teeth_mm2 = 0.0;
   for (bool found = true; found;) {
     std::map<Edge, int> uses;
     for (const Facet& f : facets)
@@ -143,9 +150,11 @@ geometry::Facets without_teeth_and_islands(geometry::Facets facets, const Points
       }
       return held < 2;
     };
-    const auto removed = std::erase_if(facets, hangs);
-    teeth += static_cast<int>(removed);
-    found = removed > 0;
+    found = std::erase_if(facets, [&](const Facet& f) {
+              const bool tooth = hangs(f);
+              teeth_mm2 += tooth ? area_of(nodes, f) : 0.0;
+              return tooth;
+            }) > 0;
   }
   // Facets that edges join, by the lowest of them.
   std::vector<std::size_t> part(facets.size());
@@ -174,20 +183,16 @@ geometry::Facets without_teeth_and_islands(geometry::Facets facets, const Points
   for (std::size_t i = 0; i < facets.size(); ++i) {
     if (areas[part[i]] >= kSmallestSeptum_mm2) kept.push_back(facets[i]);
   }
-  int islands = 0;
   double islands_mm2 = 0.0, left_mm2 = 0.0;
   for (const auto& [first, area] : areas) {
-    if (area >= kSmallestSeptum_mm2) {
-      left_mm2 += area;
-    } else {
-      ++islands, islands_mm2 += area;
-    }
+    (area >= kSmallestSeptum_mm2 ? left_mm2 : islands_mm2) += area;
   }
-  if (teeth > 0 || islands > 0) {
-    add_note(notes,
-             fmt::format("{}: {} of {:.1f} cm2; {} facets that hang on one edge and {} islands of "
-                         "together {:.1f} cm2 are left out",
-                         what, name, left_mm2 / 100.0, teeth, islands, islands_mm2 / 100.0));
+  const double lost_mm2 = teeth_mm2 + islands_mm2;
+  if (lost_mm2 > 0.0) {
+    add_note(notes, fmt::format("{}: {} of {:.1f} cm2; {:.1f} cm2 that hang on its edge or stand "
+                                "apart are left out{}",
+                                kKey, name, left_mm2 / 100.0, lost_mm2 / 100.0,
+                                what_to_do(lost_mm2 / (left_mm2 + lost_mm2), name)));
   }
   return kept;
 }
@@ -195,10 +200,9 @@ geometry::Facets without_teeth_and_islands(geometry::Facets facets, const Points
 // Interface facets of each septum.
 std::array<geometry::Facets, 2> parted_facets(const TetMesh& mesh, const Regions& regions,
                                               const std::vector<char>& taken,
-                                              const ClosedTumour& inside_tumour,
-                                              const std::string& what, Notes* notes) {
+                                              const ClosedTumour& inside_tumour, Notes* notes) {
   std::array<geometry::Facets, 2> facets;
-  int through_tumour = 0;
+  double through_tumour_mm2 = 0.0;
   std::map<std::pair<Septum, int>, bool> known;
   const std::vector<geometry::MeshFace> faces = geometry::sorted_faces(mesh.tets);
   for (std::size_t f = 0; f + 1 < faces.size(); ++f) {
@@ -217,15 +221,15 @@ std::array<geometry::Facets, 2> parted_facets(const TetMesh& mesh, const Regions
     }
     if (!parted || !regions.parted(septum, centre)) continue;
     if (inside_tumour && inside_tumour->contains(centre)) {
-      ++through_tumour;
+      through_tumour_mm2 += area_of(mesh.nodes, faces[f].nodes);
       continue;
     }
     facets[septum == Septum::kFalx ? 0 : 1].push_back(faces[f].nodes);
   }
-  if (through_tumour > 0) {
-    add_note(notes, fmt::format("{}: {} facets of falx and tentorium lie inside the tumour, which "
-                                "joins their sides; they are left out",
-                                what, through_tumour));
+  if (through_tumour_mm2 > 0.0) {
+    add_note(notes, fmt::format("{}: {:.1f} cm2 of falx and tentorium lie inside the tumour, which "
+                                "joins their sides; they are left out{}",
+                                kKey, through_tumour_mm2 / 100.0, what_to_do(0.0, "tumour")));
   }
   return facets;
 }
@@ -233,7 +237,7 @@ std::array<geometry::Facets, 2> parted_facets(const TetMesh& mesh, const Regions
 // Leaves out the facets about tissue that they would part from the brain: of less than
 // kSmallestPiece_mm3 together with all that stays joined to it.
 void join_pieces(const TetMesh& mesh, const std::vector<char>& taken, geometry::Facets& facets,
-                 std::vector<int>& septum_of, const std::string& what, Notes* notes) {
+                 std::vector<int>& septum_of, Notes* notes) {
   const std::vector<int> tissue = untaken(taken);
   const Eigen::Matrix<int, 4, Eigen::Dynamic> tets = mesh.tets(Eigen::all, tissue);
   geometry::Facets walls = facets;
@@ -252,16 +256,22 @@ void join_pieces(const TetMesh& mesh, const std::vector<char>& taken, geometry::
   }
   geometry::Facets kept;
   std::vector<int> kept_septa;
+  double all_mm2 = 0.0, lost_mm2 = 0.0;
   for (std::size_t i = 0; i < facets.size(); ++i) {
-    if (about_small.count(facets[i]) != 0) continue;
+    const double area = area_of(mesh.nodes, facets[i]);
+    all_mm2 += area;
+    if (about_small.count(facets[i]) != 0) {
+      lost_mm2 += area;
+      continue;
+    }
     kept.push_back(facets[i]);
     kept_septa.push_back(septum_of[i]);
   }
   if (kept.size() < facets.size()) {
-    add_note(notes,
-             fmt::format("{}: {} facets of falx and tentorium would part tissue of less than "
-                         "{:g} cc from the brain; they are left out",
-                         what, facets.size() - kept.size(), kSmallestPiece_mm3 / 1e3));
+    add_note(notes, fmt::format("{}: {:.1f} cm2 of falx and tentorium would part tissue of less "
+                                "than {:g} cc from the brain; they are left out{}",
+                                kKey, lost_mm2 / 100.0, kSmallestPiece_mm3 / 1e3,
+                                what_to_do(lost_mm2 / all_mm2, "falx and the tentorium")));
   }
   facets.swap(kept);
   septum_of.swap(kept_septa);
@@ -292,8 +302,8 @@ Result<geometry::SlitMesh> with_septa_and_ventricles(const TetMesh& mesh, const 
   const ClosedTumour inside_tumour = closed_tumour(tumour);
   std::vector<char> taken(at(mesh.num_tets()), 0);
   if (wanted.ventricles) {
-    taken = cavities(mesh, what, notes);
-    take_islands(mesh, taken, what, notes);
+    taken = cavities(mesh, notes);
+    take_islands(mesh, taken, notes);
     if (Status kept = check_tumour(mesh, taken, inside_tumour, what); !kept) {
       return tl::unexpected(kept.error());
     }
@@ -310,14 +320,14 @@ Result<geometry::SlitMesh> with_septa_and_ventricles(const TetMesh& mesh, const 
     }
     std::sort(rim.begin(), rim.end());
     const std::array<geometry::Facets, 2> found =
-        parted_facets(mesh, regions, taken, inside_tumour, what, notes);
+        parted_facets(mesh, regions, taken, inside_tumour, notes);
     for (std::size_t s = 0; s < 2; ++s) {
-      const geometry::Facets kept = without_teeth_and_islands(
-          found[s], mesh.nodes, rim, s == 0 ? "falx" : "tentorium", what, notes);
+      const geometry::Facets kept = without_teeth_and_islands(found[s], mesh.nodes, rim,
+                                                              s == 0 ? "falx" : "tentorium", notes);
       facets.insert(facets.end(), kept.begin(), kept.end());
       septum_of.resize(facets.size(), static_cast<int>(s));
     }
-    join_pieces(mesh, taken, facets, septum_of, what, notes);
+    join_pieces(mesh, taken, facets, septum_of, notes);
     if (facets.empty()) {
       return fail(
           ErrorCode::kEmptySet,

@@ -1,6 +1,10 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "common/geometry/misplacement.hpp"
 
+#include <fmt/format.h>
+
+#include <cmath>
+
 namespace brainshift::geometry {
 namespace {
 
@@ -30,6 +34,16 @@ std::string likely_mistake(const Points& points, const std::function<bool(const 
     if (fits(meant)) return std::string("; ") + mistake.what + "?";
   }
   return {};
+}
+
+std::string metres_for_millimetres(const Vec3& x, const std::function<bool(const Vec3&)>& fits) {
+  constexpr double kNear_mm = 0.5, kPerMetre = 1000.0;
+  const double away = x.norm();
+  const Vec3 meant = kPerMetre * x;
+  if (!(away > 0.0 && away <= kNear_mm) || !fits(meant)) return {};
+  return fmt::format(
+      "lies within {:.1f} mm of the origin; in metres it would be ({:.1f}, {:.1f}, {:.1f}) mm",
+      std::ceil(10.0 * away) / 10.0, meant.x(), meant.y(), meant.z());
 }
 
 }  // namespace brainshift::geometry

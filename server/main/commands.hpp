@@ -11,6 +11,13 @@
 #include "common/core/exit_status.hpp"
 #include "common/ranks/ranks.hpp"
 
+namespace brainshift {
+struct BrainModel;
+namespace io {
+struct OldModel;
+}
+}  // namespace brainshift
+
 namespace brainshift::server {
 
 // Prints "brainshiftd: <message>" to stderr, on one line whatever the message holds. A reader
@@ -27,9 +34,15 @@ struct PrepareArguments {
 };
 
 // Calls patient::prepare_model, writes the model file, prints a table or one JSON object to stdout.
-// A model that cannot be solved is not written. An interrupted run leaves OUT.partial, from which
+// A model that cannot be solved is not written. A model that is there is replaced, and told; any
+// other file is left alone, at exit status 2. An interrupted run leaves OUT.partial, from which
 // the next one goes on. Returns the exit status.
 int run_prepare(const PrepareArguments& arguments);
+
+// "m.h5: replaces the model of case head, 0123abcd: the new one is the same", or another, or that
+// the old one cannot be read.
+std::string replacement_text(const std::filesystem::path& out, const io::OldModel& old,
+                             const BrainModel& made);
 
 // brainshiftd serve: the daemon, during surgery.
 struct ServeArguments {

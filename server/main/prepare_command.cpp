@@ -9,6 +9,7 @@
 #include <cstdio>
 #include <cstring>
 #include <nlohmann/json.hpp>
+#include <optional>
 #include <string>
 #include <utility>
 #include <vector>
@@ -38,6 +39,7 @@ struct Outcome {
   std::vector<Usage> ranks;
   std::uintmax_t file_bytes = 0;
   double total_s = 0.0;
+  std::optional<io::OldModel> replaced;
 };
 
 // Of the whole preparation: patient::prepare_model puts the boundary before what it does for it.
@@ -69,6 +71,12 @@ std::vector<Usage> usage_of_all(Ranks* ranks) {
   return all;
 }
 
+Result<std::optional<io::OldModel>> model_to_replace(const std::filesystem::path& out) {
+  auto old = io::model_to_replace(out);
+  if (!old) return fail(old.error().code, "--out: " + old.error().message);
+  return old;
+}
+
 Result<CaseConfig> check_arguments(const PrepareArguments& arguments,
                                    const std::filesystem::path& checkpoint) {
   for (const std::filesystem::path& path : {arguments.out, checkpoint}) {
@@ -78,6 +86,8 @@ Result<CaseConfig> check_arguments(const PrepareArguments& arguments,
   if (std::filesystem::equivalent(arguments.out, arguments.case_file, ignored)) {
     return invalid("--out: " + arguments.out.string() + ": is the case itself");
   }
+  // Before the work; once more before the file is written.
+  if (auto old = model_to_replace(arguments.out); !old) return tl::unexpected(old.error());
   auto config = io::read_case_config(arguments.case_file);
   if (!config) return config;
   if (auto plan = pipeline::plan_scene(*config, Method::kCondensed, Boundary::kContact); !plan) {
@@ -115,15 +125,23 @@ Result<Outcome> prepare(const PrepareArguments& arguments, ProgressBar& bar) {
     }
   }
   Status written;
+  std::optional<io::OldModel> replaced;
   if (first) {
     bar.show("step 4 of 4", "write model", 1.0);
-    written = io::write_model(arguments.out, prepared->file);
+    auto old = model_to_replace(arguments.out);
+    written =
+        old ? io::write_model(arguments.out, prepared->file) : Status(tl::unexpected(old.error()));
+    if (written && *old) {
+      bar.note(replacement_text(arguments.out, **old, prepared->file.model));
+      replaced = std::move(*old);
+    }
   }
   if (auto ok = agreed(written); !ok) return tl::unexpected(ok.error());
   if (auto ok = agreed(prepared->checkpoint->remove()); !ok) return tl::unexpected(ok.error());
   std::error_code ignored;
   return Outcome{std::move(*prepared), usage_of_all(arguments.ranks),
-                 std::filesystem::file_size(arguments.out, ignored), whole.seconds()};
+                 std::filesystem::file_size(arguments.out, ignored), whole.seconds(),
+                 std::move(replaced)};
 }
 
 nlohmann::json to_json(const Outcome& outcome, const std::filesystem::path& out) {
@@ -155,6 +173,11 @@ nlohmann::json to_json(const Outcome& outcome, const std::filesystem::path& out)
         {"condensed_s", condensed.prepare_s},
         {"condensed_modes", condensed.num_modes()},
         {"condensed_bytes", condensed.bytes()}};
+  }
+  if (outcome.replaced) {
+    json["replaced"] = {{"case", outcome.replaced->case_id},
+                        {"model_id", outcome.replaced->model_id},
+                        {"same", outcome.replaced->model_id == model.model_id}};
   }
   json["total_s"] = outcome.total_s;
   json["model_file_bytes"] = outcome.file_bytes;
@@ -203,6 +226,16 @@ void print_table(const Outcome& outcome, const std::filesystem::path& out) {
 }
 
 }  // namespace
+
+std::string replacement_text(const std::filesystem::path& out, const io::OldModel& old,
+                             const BrainModel& made) {
+  const std::string there = out.string() + ": replaces ";
+  if (!old.unreadable.empty()) return there + "a model that cannot be read: " + old.unreadable;
+  return there + fmt::format("the model of case {}, {}: {}", old.case_id, old.model_id,
+                             old.model_id == made.model_id
+                                 ? "the new one is the same"
+                                 : "the new one is another, " + made.model_id);
+}
 
 int run_prepare(const PrepareArguments& arguments) {
   const bool first = arguments.ranks == nullptr || arguments.ranks->rank() == 0;

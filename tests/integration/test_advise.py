@@ -41,5 +41,6 @@ def test_a_pointer_at_the_target_beats_one_far_from_it(folder, advise):
 def test_what_is_wrong_is_one_line(folder, inputs, advise):
     refused(advise("--observations", 99), "--observations is 99, but", "holds")
     refused(advise("--target", 300, 0, 0), "target (300.0, 0.0, 0.0) mm: point", "outside the brain")
+    refused(advise("--target", 0.03, 0.01, 0.02), "--target 0.03 0.01 0.02", "in metres it would be (30.0, 10.0, 20.0)")
     refused(advise("--candidates", folder / "none.csv"), folder / "none.csv")
     refused(brainshift("advise", inputs / "toy" / "a.surgery", "--model", inputs / "head" / "model.h5"), "meta.model_id is")

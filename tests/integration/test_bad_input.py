@@ -124,6 +124,7 @@ def test_bad_usage_exits_two_with_one_line(folder):
             ((*prepare, "--out", "m.h5", "--fast"), "--fast"),
             ((*prepare, "--out", "/nonexistent/m.h5"), "/nonexistent"),
             ((*prepare, "--out", folder), "folder"),
+            ((*prepare, "--out", garbage), "garbage.h5: is there and is no model file"),
             (("serve", ), "--config"),
             (("serve", "--config", folder / "none.yaml"), "none.yaml"),
             (("serve", "--config", unknown), "enpoint"),

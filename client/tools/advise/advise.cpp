@@ -10,6 +10,7 @@
 #include <span>
 #include <utility>
 
+#include "common/geometry/misplacement.hpp"
 #include "common/io/files/file_access.hpp"
 #include "common/io/model/model_file.hpp"
 #include "common/io/recording/surgery_file.hpp"
@@ -185,6 +186,11 @@ Result<Adviser> Adviser::open(const AdviserOptions& options) {
   advice::Target target;
   if (options.target_mm) {
     const Vec3& at = *options.target_mm;
+    const std::string metres = geometry::metres_for_millimetres(
+        at, [&](const Vec3& x) { return locator->locate(x).distance_mm == 0.0; });
+    if (!metres.empty()) {
+      return invalid(fmt::format("--target {:g} {:g} {:g} {}", at[0], at[1], at[2], metres));
+    }
     target = {fmt::format("({:.1f}, {:.1f}, {:.1f}) mm", at[0], at[1], at[2]), at};
   } else {
     target = advice::tumour_target(file->model);

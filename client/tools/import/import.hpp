@@ -68,7 +68,7 @@ struct ImportReport {
 
 // Leaves nothing behind on failure. kInvalidArgument, kNotFound, kUnreadable or kEmptySet for
 // input that cannot be used, e.g. a boundary more than 100 mm from the case's tumour; the sentence
-// names option, file, frame or field. kWriteFailed: `out` exists or cannot be written.
+// names option, file, frame or field. An `out` that exists is such input. kWriteFailed.
 Result<ImportReport> import_recording(const ImportOptions& options, const Progress& progress = {});
 
 // The report as lines for a terminal.

@@ -3,9 +3,13 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
+#include <limits>
 #include <utility>
 
 #include "common/core/text.hpp"
+#include "common/geometry/mask.hpp"
+#include "common/geometry/misplacement.hpp"
 #include "common/io/config/plus_config.hpp"
 #include "common/io/model/model_file.hpp"
 #include "common/patient/read_patient.hpp"
@@ -55,7 +59,7 @@ Result<std::vector<tracking::ConstantLink>> device_links(const fs::path& device)
 Status check_new(const fs::path& out) {
   std::error_code ignored;
   if (!fs::exists(out, ignored)) return {};
-  return fail(ErrorCode::kWriteFailed, out.string() + ": exists already");
+  return invalid(out.string() + ": exists already");
 }
 
 Result<ImportCase> load_import_case(const fs::path& case_file, const fs::path& model,
@@ -99,17 +103,43 @@ Status check_error_place(const fs::path& case_file, const fs::path& model,
 
 std::string error_place(const std::optional<Vec3>& target) {
   if (!target) return "the tumour";
-  return fmt::format("({:.1f}, {:.1f}, {:.1f})", target->x(), target->y(), target->z());
+  const int digits = target->norm() < 1.0 ? 3 : 1;
+  return fmt::format("({0:.{3}f}, {1:.{3}f}, {2:.{3}f})", target->x(), target->y(), target->z(),
+                     digits);
 }
 
 Status check_reach(const Vec3& target, const std::string& name, const Vec3& middle,
                    const std::string& of) {
   const double away = (target - middle).norm();
+  const std::string metres = geometry::metres_for_millimetres(
+      target, [&](const Vec3& x) { return (x - middle).norm() <= kLargestReach_mm; });
+  if (!metres.empty()) return invalid(name + " " + metres);
   if (away <= kLargestReach_mm) return {};
   return invalid(fmt::format(
       "{} lies {:.0f} mm from the middle of {}, ({:.1f}, {:.1f}, {:.1f}): must lie within {:g} mm; "
       "is it mm RAS, and of this head?",
       name, away, of, middle.x(), middle.y(), middle.z(), kLargestReach_mm));
+}
+
+Status check_in_brain(const Vec3& target, const std::string& name, const VoxelImage& mask,
+                      const std::string& of) {
+  double away = std::numeric_limits<double>::infinity(), in_metres = away;
+  Vec3 low = Vec3::Constant(away), high = -low;
+  geometry::for_each_voxel(
+      mask, [](float v) { return v > 0.0F; },
+      [&](std::size_t, const Vec3& x) {
+        away = std::min(away, (x - target).norm());
+        in_metres = std::min(in_metres, (x - 1000.0 * target).norm());
+        low = low.cwiseMin(x), high = high.cwiseMax(x);
+      });
+  const std::string metres = geometry::metres_for_millimetres(
+      target, [&](const Vec3&) { return in_metres <= kBesideBrain_mm; });
+  if (!metres.empty()) return invalid(name + " " + metres);
+  if (away <= kBesideBrain_mm) return {};
+  return invalid(fmt::format(
+      "{} lies {:.0f} mm from {}, which reaches from ({:.0f}, {:.0f}, {:.0f}) to ({:.0f}, {:.0f}, "
+      "{:.0f}): must lie within {:g} mm; is it mm RAS, and of this head?",
+      name, away, of, low[0], low[1], low[2], high[0], high[1], high[2], kBesideBrain_mm));
 }
 
 FiducialReport describe(const registration::FiducialRegistration& fit, bool matched,

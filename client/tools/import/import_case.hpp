@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "common/core/error.hpp"
+#include "common/core/mesh.hpp"
 #include "common/core/progress.hpp"
 #include "common/core/types.hpp"
 #include "common/io/recording/surgery_file.hpp"
@@ -46,7 +47,7 @@ Status check_option(const char* name, double value, double least, double most);
 // io::read_plus_config.
 Result<std::vector<tracking::ConstantLink>> device_links(const std::filesystem::path& device);
 
-// kWriteFailed when `out` exists already.
+// kInvalidArgument when `out` exists already.
 Status check_new(const std::filesystem::path& out);
 
 // Writes a surgery file of observations, as `brainshift replay` plays it.
@@ -65,9 +66,16 @@ std::string error_place(const std::optional<Vec3>& target);
 // From the middle of a head, or of the fiducials on it, to a place within.
 inline constexpr double kLargestReach_mm = 300.0;
 // kInvalidArgument where a target lies farther from the middle `of` something ("the fiducials in
-// the image"). name: "--target (1.0, 2.0, 3.0)", "the tumour".
+// the image"), or is in metres. name: "--target (1.0, 2.0, 3.0)", "the tumour".
 Status check_reach(const Vec3& target, const std::string& name, const Vec3& middle,
                    const std::string& of);
+
+// A meningioma or a pituitary lies beside the brain.
+inline constexpr double kBesideBrain_mm = 30.0;
+// kInvalidArgument where a target lies farther from every voxel > 0 of a mask, or is in metres. of:
+// of whose brain. The sentence says from where to where the mask reaches.
+Status check_in_brain(const Vec3& target, const std::string& name, const VoxelImage& mask,
+                      const std::string& of);
 
 // What a user should know about a registration by fiducials before relying on it.
 struct FiducialReport {

@@ -62,8 +62,8 @@ inline constexpr double kLargestMotion_mm = 60.0;
 
 // Leaves nothing behind on failure. kInvalidArgument, kNotFound, kUnreadable or kEmptySet for input
 // that cannot be used: fewer than 3 pairs, a landmark farther than above from the case's brain or
-// from where it was; the sentence names option, file and landmark. kWriteFailed: `out` exists or
-// cannot be written.
+// from where it was; the sentence names option, file and landmark. An `out` that exists is
+// such input. kWriteFailed.
 Result<LandmarkReport> import_landmarks(const LandmarkOptions& options,
                                         const Progress& progress = {});
 

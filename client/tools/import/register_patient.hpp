@@ -67,7 +67,7 @@ struct RegisterReport {
 
 // Writes T_ras_reference to `out`, or leaves nothing behind. kInvalidArgument, kNotFound,
 // kUnreadable, kEmptySet or kNotConverged for input that cannot be used; the sentence names option,
-// file and figure. kWriteFailed: `out` exists or cannot be written.
+// file and figure. An `out` that exists is such input. kWriteFailed.
 Result<RegisterReport> register_patient(const RegisterOptions& options,
                                         const Progress& progress = {});
 

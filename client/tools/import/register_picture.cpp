@@ -24,8 +24,8 @@ constexpr int kRowGap = 16;
 constexpr double kBar_mm = 20.0;
 constexpr double kTint = 0.8;  // of the brightest echo over the MRI
 const cv::Scalar kEchoes = palette::kSkyBlue;
-const Stroke kTumourNow{palette::kOrange, 4, 0.0};
-const Stroke kTumourThen{palette::kVermillion, 4, 12.0};
+const Stroke kTumourNow{meaning::kEstimated, 4, 0.0};
+const Stroke kTumourThen{meaning::kBefore, 4, 12.0};
 
 // A frame of ultrasound as a rectangle in space, in the frame of its pose.
 struct FramePlane {

@@ -101,9 +101,8 @@ Result<PatientImages> read_images(const UltrasoundRegisterOptions& options,
   }
   if (options.target) {
     images.target = *options.target;
-    const Status reached = check_reach(images.target, "--target " + error_place(options.target),
-                                       geometry::mask_centre(images.brain).centre,
-                                       "the brain in " + options.brain.string());
+    const Status reached = check_in_brain(images.target, "--target " + error_place(options.target),
+                                          images.brain, "the brain in " + options.brain.string());
     if (!reached) return tl::unexpected(reached.error());
     return images;
   }

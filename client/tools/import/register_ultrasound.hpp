@@ -82,8 +82,8 @@ struct UltrasoundRegisterReport {
 
 // Writes T_ras_reference to `out` and the picture, or leaves nothing behind. kInvalidArgument,
 // kNotFound, kUnreadable, kEmptySet or kNotConverged for input that cannot be used or shows too
-// little; the sentence names option, file and figure. kWriteFailed: `out` or the picture exists or
-// cannot be written.
+// little; the sentence names option, file and figure. An `out` or a picture that
+// exists is such input. kWriteFailed.
 Result<UltrasoundRegisterReport> register_ultrasound(const UltrasoundRegisterOptions& options,
                                                      const Progress& progress = {});
 

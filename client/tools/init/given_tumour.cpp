@@ -6,12 +6,15 @@
 #include <algorithm>
 #include <cmath>
 #include <functional>
+#include <limits>
 #include <set>
 #include <string_view>
 #include <utility>
 
-#include "common/anatomy/given_inputs.hpp"
+#include "common/anatomy/brain_mesh.hpp"
 #include "common/core/text.hpp"
+#include "common/geometry/mask.hpp"
+#include "common/geometry/misplacement.hpp"
 #include "common/io/dicom/dicom_segmentation.hpp"
 #include "common/io/dicom/dicom_structures.hpp"
 #include "common/io/dicom/filled_contours.hpp"
@@ -276,6 +279,82 @@ Result<GivenTumour> read_tumour(const TumourFile& given, const VoxelImage& grid,
                      given.segment.empty() ? choice->why : "the segment",
                      {},
                      false};
+}
+
+namespace {
+
+constexpr Eigen::Index kMostPlaces = 4000;
+constexpr double kMostOutside = 0.5;
+
+// Of places of the tumour: the share that lies in no voxel of the mask, and how far the farthest
+// of these lies from one.
+class BrainPlaces {
+ public:
+  explicit BrainPlaces(const VoxelImage& mask)
+      : mask_(mask), T_voxel_ras_(mask.T_ras_voxel.inverse()) {}
+
+  bool has(const Vec3& x) const {
+    const Eigen::Vector3i at = (T_voxel_ras_ * x).array().round().cast<int>();
+    const bool there = (at.array() >= 0).all() && at[0] < mask_.dims[0] && at[1] < mask_.dims[1] &&
+                       at[2] < mask_.dims[2];
+    return there && mask_.at(at[0], at[1], at[2]) > 0.0F;
+  }
+  double outside_share(const Points& places) const {
+    double outside = 0.0;
+    for (const auto& x : places.colwise()) outside += has(x) ? 0.0 : 1.0;
+    return outside / static_cast<double>(std::max<Eigen::Index>(1, places.cols()));
+  }
+  double farthest_mm(const Points& places) const {
+    VecX nearest = VecX::Constant(places.cols(), std::numeric_limits<double>::infinity());
+    std::vector<Eigen::Index> outside;
+    for (Eigen::Index i = 0; i < places.cols(); ++i) {
+      if (!has(places.col(i))) outside.push_back(i);
+    }
+    const std::size_t step = 1 + outside.size() / 100;
+    geometry::for_each_voxel(
+        mask_, [](float v) { return v > 0.0F; },
+        [&](std::size_t, const Vec3& voxel) {
+          for (std::size_t i = 0; i < outside.size(); i += step) {
+            double& least = nearest[outside[i]];
+            least = std::min(least, (places.col(outside[i]) - voxel).squaredNorm());
+          }
+        });
+    double farthest = 0.0;
+    for (const double squared : nearest) {
+      if (std::isfinite(squared)) farthest = std::max(farthest, squared);
+    }
+    return std::sqrt(farthest);
+  }
+
+ private:
+  const VoxelImage& mask_;
+  AffineTransform T_voxel_ras_;
+};
+
+}  // namespace
+
+Result<std::string> place_in_brain(const Points& voxels, const VoxelImage& brain,
+                                   const std::string& what) {
+  // A label map may leave the tumour out of the brain.
+  const VoxelImage filled = geometry::largest_component(brain).value_or(brain);
+  const BrainPlaces in_brain(filled);
+  const Eigen::Index step = 1 + voxels.cols() / kMostPlaces;
+  Points places(3, (voxels.cols() + step - 1) / step);
+  for (Eigen::Index i = 0; i < places.cols(); ++i) places.col(i) = voxels.col(step * i);
+  const double share = in_brain.outside_share(places), far = in_brain.farthest_mm(places);
+  if (share == 0.0) return std::string();
+  const std::string sentence =
+      fmt::format("{}: {:.0f} % of the tumour lie outside the brain, up to {:.0f} mm from it", what,
+                  std::max(1.0, 100.0 * share), far);
+  if (share > kMostOutside) {
+    return invalid(sentence + geometry::likely_mistake(places, [&](const Points& meant) {
+                     return in_brain.outside_share(meant) <= kMostOutside;
+                   }));
+  }
+  return far > anatomy::kLargestCut_mm
+             ? sentence +
+                   fmt::format("; more than {:g} mm are not prepared", anatomy::kLargestCut_mm)
+             : std::string();
 }
 
 }  // namespace brainshift::client

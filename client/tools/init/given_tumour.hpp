@@ -15,6 +15,7 @@
 
 #include "common/core/error.hpp"
 #include "common/core/mesh.hpp"
+#include "common/core/types.hpp"
 
 namespace brainshift::client {
 
@@ -43,5 +44,13 @@ struct MriIdentity {
 // Errors of the readers and of io::fill_contours.
 Result<GivenTumour> read_tumour(const TumourFile& given, const VoxelImage& grid,
                                 const MriIdentity& mri);
+
+// Where the tumour's voxels (their centres, mm RAS) lie against the brain's mask: a doubt, as a
+// sentence, when some lie farther outside than preparation would cut (anatomy::kLargestCut_mm);
+// else "". Of many voxels a part is looked at. `what`: of the sentence. kInvalidArgument: more than
+// half of them lie outside; with the share, the distance and the mistake that would explain it
+// (geometry::likely_mistake).
+Result<std::string> place_in_brain(const Points& voxels, const VoxelImage& brain,
+                                   const std::string& what);
 
 }  // namespace brainshift::client

@@ -171,11 +171,10 @@ fs::path beside(const fs::path& out, const std::string& what) {
 Result<VoxelImage> read_labels(const fs::path& path) {
   auto map = io::read_volume(path);
   if (!map) return map;
-  if (Status good = anatomy::check_label_map(*map, "--labels: " + path.string()); !good) {
-    return tl::unexpected(good.error());
-  }
   const auto names = io::label_names_beside(path);
   if (!names) return tl::unexpected(names.error());
+  const Status good = anatomy::check_label_map(*map, "--labels: " + path.string());
+  if (!good) return tl::unexpected(good.error());
   if (names->empty()) return map;
   auto renamed = anatomy::with_freesurfer_numbers(*map, *names);
   if (!renamed) return io::file_error(path, renamed.error());
@@ -207,6 +206,16 @@ std::string about_series(const io::DicomSeries& series) {
   return text + ".";
 }
 
+Points voxels_of(const std::vector<anatomy::Focus>& foci) {
+  std::vector<Vec3> all;
+  for (const anatomy::Focus& focus : foci) {
+    for_each_of(focus.mask, [&all](const Vec3& x) { all.push_back(x); });
+  }
+  Points voxels(3, static_cast<Eigen::Index>(all.size()));
+  for (Eigen::Index i = 0; i < voxels.cols(); ++i) voxels.col(i) = all[static_cast<std::size_t>(i)];
+  return voxels;
+}
+
 Status guess_tumour(Draft& draft, const VoxelImage& brain) {
   const InitOptions& options = draft.options;
   MriIdentity mri;
@@ -231,7 +240,11 @@ Status guess_tumour(Draft& draft, const VoxelImage& brain) {
                     "the background, or the brain?",
                     options.tumour.string(), mm3 / kMm3PerCc, given->why, brain_mm3 / kMm3PerCc));
   }
+  const auto doubt =
+      place_in_brain(voxels_of(*foci), brain, "--tumour: " + options.tumour.string());
+  if (!doubt) return tl::unexpected(doubt.error());
   draft.about_tumour = fmt::format("{:.2f} cc ({}).", mm3 / kMm3PerCc, given->why);
+  if (!doubt->empty()) draft.about_tumour += " LOOK AGAIN: " + *doubt + ".";
   for (const std::string& note : given->notes) draft.about_tumour += " " + note + ".";
   for (const std::string& note : notes) {
     draft.about_tumour += " " + note.substr(options.tumour.string().size() + 2) + ".";
@@ -313,16 +326,16 @@ void doubt_labels(Draft& draft, const VoxelImage& labels) {
 }
 
 Result<VoxelImage> given_brain(Draft& draft) {
-  const std::string file = draft.options.brain.string();
+  const std::string what = "--brain: " + draft.options.brain.string();
   const auto given = io::read_volume(draft.options.brain);
   if (!given) return tl::unexpected(given.error());
   anatomy::Notes notes;
-  auto mask = anatomy::brain_mask(*given, file, &notes);
+  auto mask = anatomy::brain_mask(*given, what, &notes);
   if (!mask) return mask;
   draft.about_brain =
       fmt::format("Given; {:.0f} cc.", geometry::mask_centre(*mask).volume_mm3 / kMm3PerCc);
   for (const std::string& note : notes) {
-    draft.about_brain += " " + note.substr(file.size() + 2) + ".";
+    draft.about_brain += " " + note.substr(what.size() + 2) + ".";
   }
   return mask;
 }

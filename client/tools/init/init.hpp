@@ -45,7 +45,8 @@ struct InitSummary {
 // that is no UTF-8, a position, a label map with values that are no whole numbers, labels that
 // the tumour's map does not have (those that it has are listed), several labels and none chosen
 // where they are not BraTS's (1, 2 and 3 or 4: then all but 2, oedema), a segmentation or structure
-// set of another frame of reference than the series, a tumour of more than half the brain. Errors
+// set of another frame of reference than the series, a tumour of more than half the brain or mostly
+// outside of it, an MRI for a label map or for the brain. Errors
 // of the readers and of io::fill_contours; kWriteFailed.
 Result<InitSummary> write_first_case(const InitOptions& options);
 

@@ -26,7 +26,7 @@ class NewSurgery {
   static Result<NewSurgery> create(const fs::path& out, const io::SurgeryMeta& meta) {
     std::error_code ignored;
     if (fs::exists(fs::symlink_status(out, ignored))) {
-      return io::write_failed(out, "exists already");
+      return io::invalid_file(out, "exists already");
     }
     fs::path temporary = out;
     temporary.replace_filename(fmt::format(".{}.tmp-{}", out.filename().string(), ::getpid()));

@@ -113,6 +113,9 @@ void draw_vertical_text(cv::Mat& image, cv::Point centre, const std::string& tex
 }
 
 void draw_polyline(cv::Mat& image, const std::vector<cv::Point2d>& points, const Stroke& stroke) {
+  if (stroke.rim > 0) {
+    draw_polyline(image, points, {palette::kBlack, stroke.thickness + 2 * stroke.rim, 0.0});
+  }
   double travelled = 0.0;  // along the line, so that dashes run on through corners
   for (std::size_t i = 1; i < points.size(); ++i) {
     const cv::Point2d a = points[i - 1];

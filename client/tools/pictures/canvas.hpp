@@ -32,6 +32,17 @@ inline const cv::Scalar kGrey(120, 120, 120);
 inline const cv::Scalar kPale(225, 225, 225);
 }  // namespace palette
 
+// What a colour stands for in every picture and chart.
+namespace meaning {
+inline const cv::Scalar kBefore = palette::kWhite;  // as in the MRI; dashed
+inline const cv::Scalar kEstimated = palette::kOrange;
+inline const cv::Scalar kTrue = palette::kSkyBlue;
+inline const cv::Scalar kSeptum = palette::kGreen;
+inline const cv::Scalar kVentricle = palette::kVermillion;
+inline const cv::Scalar kContact = palette::kBlue;  // boundary conditions
+inline const cv::Scalar kFixed = palette::kPurple;
+}  // namespace meaning
+
 // An image as the bytes of a PNG file. kInternal; `name` is the file's, for the message.
 Result<std::string> encode_png(const std::string& name, const cv::Mat& image);
 
@@ -63,6 +74,7 @@ struct Stroke {
   cv::Scalar colour = palette::kInk;
   int thickness = 2;
   double dash_px = 0.0;  // 0: solid; else equal dashes and gaps
+  int rim = 0;           // width of a black rim, which parts it from what is as bright
 };
 
 // Sub-pixel, anti-aliased. Parts outside the image are clipped.

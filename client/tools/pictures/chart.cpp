@@ -15,6 +15,7 @@ constexpr const char* kInk = "var(--ink,#1c1c1c)";
 constexpr const char* kSoft = "var(--soft,#5a5a5a)";
 constexpr const char* kRule = "var(--rule,#d4d4d4)";
 constexpr double kCharacter = 6.6;  // mean width at 13 px
+constexpr double kUprightLine = 16.0;
 
 std::string colour_of(const cv::Scalar& bgr) {
   if (bgr == palette::kInk || bgr == palette::kBlack) return kInk;
@@ -73,6 +74,21 @@ struct LegendSample {
   Marker marker = Marker::kNone;
 };
 
+// Lines of at most `length` pixels, broken at blanks; a longer word has a line of its own.
+std::vector<std::string> broken(const std::string& text, double length) {
+  std::vector<std::string> lines;
+  std::istringstream words(text);
+  for (std::string word; words >> word;) {
+    const std::string longer = lines.empty() ? word : lines.back() + " " + word;
+    if (!lines.empty() && kCharacter * static_cast<double>(longer.size()) <= length) {
+      lines.back() = longer;
+    } else {
+      lines.push_back(word);
+    }
+  }
+  return lines;
+}
+
 // The parts of a chart, in the order in which they are drawn.
 class Drawing {
  public:
@@ -86,10 +102,13 @@ class Drawing {
         fmt::format("<text x=\"{:.1f}\" y=\"{:.1f}\" text-anchor=\"{}\" fill=\"{}\"{}>{}</text>\n",
                     x, y, anchor, colour, more, escape_html(words));
   }
-  void upright_text(double x, const std::string& words, const std::string& colour) {
+  void upright_text(double x, const std::vector<std::string>& lines, const std::string& colour) {
     const double y = 0.5 * (top + bottom);
-    text(x, y, words, "middle", colour,
-         fmt::format(" transform=\"rotate(-90 {:.1f} {:.1f})\"", x, y).c_str());
+    for (const std::string& words : lines) {
+      text(x, y, words, "middle", colour,
+           fmt::format(" transform=\"rotate(-90 {:.1f} {:.1f})\"", x, y).c_str());
+      x += kUprightLine;
+    }
   }
   void line(const std::vector<cv::Point2d>& points, const std::string& colour, double width,
             double dash_px = 0.0) {
@@ -124,9 +143,11 @@ class Drawing {
     }
   }
 
-  // Titles and, in rows below them, the legend; the data area is what remains.
+  // Titles and, in rows below them, the legend; the data area is what remains. The labels of its
+  // upright axes are broken where they are longer than it is high.
   void head(const std::string& title, const std::string& subtitle,
-            const std::vector<LegendSample>& samples, double right_margin, double bottom_margin) {
+            const std::vector<LegendSample>& samples, const std::string& y_label,
+            const std::string& right_label, double right_margin, double bottom_margin) {
     double y = 8.0;
     if (!title.empty()) text(10.0, y += 14.0, title, "start", kInk, " font-weight=\"600\"");
     if (!subtitle.empty()) text(10.0, y += 18.0, subtitle, "start", kSoft);
@@ -143,8 +164,14 @@ class Drawing {
       x += width;
     }
     top = y + 14.0;
-    right = size_.width - right_margin;
     bottom = size_.height - bottom_margin;
+    y_lines_ = broken(y_label, bottom - top);
+    right_lines_ = broken(right_label, bottom - top);
+    const auto more = [](const std::vector<std::string>& lines) {
+      return kUprightLine * std::max(0.0, static_cast<double>(lines.size()) - 1.0);
+    };
+    left += more(y_lines_);
+    right = size_.width - right_margin - more(right_lines_);
     body_ += fmt::format(
         "<rect x=\"{:.1f}\" y=\"{:.1f}\" width=\"{:.1f}\" height=\"{:.1f}\" "
         "fill=\"none\" stroke=\"{}\"/>\n",
@@ -172,13 +199,14 @@ class Drawing {
       line({{left, y}, {right, y}}, kRule, 1.0);
       text(left - 7.0, y + 4.0, tick.text, "end", kSoft);
     }
-    upright_text(16.0, axis.label, kInk);
+    upright_text(16.0, y_lines_, kInk);
   }
   void right_axis(const Axis& axis, const Range& range, const std::string& colour) {
     for (const Tick& tick : ticks_of(axis, range)) {
       text(right + 7.0, y_at(tick.value, axis, range) + 4.0, tick.text, "start", colour);
     }
-    upright_text(size_.width - 10.0, axis.label, colour);
+    const double lines = static_cast<double>(right_lines_.size());
+    upright_text(size_.width - 10.0 - kUprightLine * (lines - 1.0), right_lines_, colour);
   }
 
   std::string finish(const std::string& name) const {
@@ -200,6 +228,7 @@ class Drawing {
 
   cv::Size size_;
   std::string body_;
+  std::vector<std::string> y_lines_, right_lines_;
 };
 
 std::string value_text(double value) { return fmt::format("{:.3g}", value); }
@@ -249,23 +278,29 @@ std::string draw_chart(const ChartSpec& spec) {
     const Axis& vertical = series.right_axis ? spec.right : spec.y;
     Range& range = series.right_axis ? right_y : y;
     if (series.right_axis && on_the_right == nullptr) on_the_right = &series;
+    bool joined = false, before = false;  // a legend shows a line where one is drawn
     for (const ChartPoint& p : series.points) {
-      if (!can_show(p.x, spec.x) || !can_show(p.y, vertical)) continue;
+      const bool shown = can_show(p.x, spec.x) && can_show(p.y, vertical);
+      joined = joined || (shown && before);
+      before = shown;
+      if (!shown) continue;
       x.include(p.x);
       for (const double end : {p.y - p.sd, p.y + p.sd}) {
         if (can_show(end, vertical)) range.include(end);
       }
     }
     if (series.legend.empty()) continue;
-    samples.push_back({series.legend, colour_of(series.colour), series.line, false, series.dash_px,
-                       series.marker});
+    samples.push_back({series.legend, colour_of(series.colour), series.line && joined, false,
+                       series.dash_px, series.marker});
   }
   x = padded(x, spec.x);
   y = padded(y, spec.y);
   right_y = padded(right_y, spec.right);
 
   Drawing drawing(spec.size);
-  drawing.head(spec.title, spec.subtitle, samples, on_the_right != nullptr ? 64.0 : 16.0, 46.0);
+  drawing.head(spec.title, spec.subtitle, samples, spec.y.label,
+               on_the_right != nullptr ? spec.right.label : "",
+               on_the_right != nullptr ? 64.0 : 16.0, 46.0);
   drawing.y_axis(spec.y, y);
   drawing.x_axis(spec.x, x);
   if (on_the_right != nullptr) {
@@ -328,7 +363,7 @@ std::string draw_bars(const BarSpec& spec) {
   }
   if (!spec.references.empty()) samples.push_back({spec.reference_legend, kInk, true});
   Drawing drawing(spec.size);
-  drawing.head(spec.title, spec.subtitle, samples, 16.0, 58.0);
+  drawing.head(spec.title, spec.subtitle, samples, spec.y_label, "", 16.0, 58.0);
   const Axis axis{.label = spec.y_label};
   const Range range{spec.y_min, spec.y_max};
   drawing.y_axis(axis, range);

@@ -60,6 +60,13 @@ void draw_legend(cv::Mat& image, int top, int height, const std::vector<PlacedEn
 
 }  // namespace
 
+void name_in_legend(Sheet& sheet, const LegendEntry& entry) {
+  const bool there =
+      std::any_of(sheet.legend.begin(), sheet.legend.end(),
+                  [&entry](const LegendEntry& other) { return other.name == entry.name; });
+  if (!there) sheet.legend.push_back(entry);
+}
+
 cv::Mat compose(const Sheet& sheet) {
   constexpr int kPanelTitle = 56;
   constexpr int kBarWidth = 190;

@@ -27,6 +27,9 @@ struct Sheet {
   std::string colour_label;
 };
 
+// Into the legend, once: for what is drawn in one of several panels.
+void name_in_legend(Sheet& sheet, const LegendEntry& entry);
+
 // 8-bit BGR, as large as its parts need. Narrow panels: subtitle and legend are wrapped.
 cv::Mat compose(const Sheet& sheet);
 

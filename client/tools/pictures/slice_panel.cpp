@@ -82,18 +82,29 @@ std::vector<std::vector<Vec3>> section_polylines(const TriangleSurface& surface,
                                                  double offset) {
   constexpr double kSame_mm = 1e-6;
   const Points ends = geometry::plane_section(surface, normal, offset);
+  const auto end = [&ends](std::size_t segment, int which) -> Vec3 {
+    return ends.col(static_cast<Eigen::Index>(2 * segment) + which);
+  };
+  const auto same = [](const Vec3& a, const Vec3& b) { return (a - b).norm() < kSame_mm; };
+  // The two sides of a sheet lie on each other: one is enough, and a line would turn back on the
+  // other.
   std::vector<bool> used(static_cast<std::size_t>(ends.cols()) / 2, false);
+  for (std::size_t s = 0; s < used.size(); ++s) {
+    for (std::size_t other = 0; other < s && !used[s]; ++other) {
+      if (used[other]) continue;
+      used[s] = (same(end(s, 0), end(other, 0)) && same(end(s, 1), end(other, 1))) ||
+                (same(end(s, 0), end(other, 1)) && same(end(s, 1), end(other, 0)));
+    }
+  }
   std::vector<std::vector<Vec3>> lines;
   // The unused segment that starts or ends at `from`; its far end is appended.
   const auto extend = [&](std::vector<Vec3>& line) {
     for (std::size_t s = 0; s < used.size(); ++s) {
       if (used[s]) continue;
-      const Vec3 a = ends.col(static_cast<Eigen::Index>(2 * s));
-      const Vec3 b = ends.col(static_cast<Eigen::Index>(2 * s + 1));
-      const bool at_a = (a - line.back()).norm() < kSame_mm;
-      if (!at_a && (b - line.back()).norm() >= kSame_mm) continue;
+      const bool at_first = same(end(s, 0), line.back());
+      if (!at_first && !same(end(s, 1), line.back())) continue;
       used[s] = true;
-      line.push_back(at_a ? b : a);
+      line.push_back(end(s, at_first ? 1 : 0));
       return true;
     }
     return false;
@@ -101,8 +112,7 @@ std::vector<std::vector<Vec3>> section_polylines(const TriangleSurface& surface,
   for (std::size_t s = 0; s < used.size(); ++s) {
     if (used[s]) continue;
     used[s] = true;
-    std::vector<Vec3> line = {ends.col(static_cast<Eigen::Index>(2 * s)),
-                              ends.col(static_cast<Eigen::Index>(2 * s + 1))};
+    std::vector<Vec3> line = {end(s, 0), end(s, 1)};
     while (extend(line)) {
     }
     std::reverse(line.begin(), line.end());
@@ -171,13 +181,48 @@ void SlicePanel::draw_arrows(const SliceSamples& samples, const Points& displace
   }
 }
 
-void SlicePanel::draw_section(const TriangleSurface& surface, const Stroke& stroke) {
+bool SlicePanel::draw_section(const TriangleSurface& surface, const Stroke& stroke) {
+  const cv::Rect2d picture(0.0, 0.0, image_.cols, image_.rows);
+  bool seen = false;
+  std::vector<std::vector<cv::Point2d>> lines;
   for (const auto& line :
        section_polylines(surface, Vec3::Unit(window_.normal_axis()), window_.offset_mm)) {
-    std::vector<cv::Point2d> pixels;
-    for (const Vec3& point : line) pixels.push_back(window_.pixel(point));
-    draw_polyline(image_, pixels, stroke);
+    std::vector<cv::Point2d>& pixels = lines.emplace_back();
+    for (const Vec3& point : line) {
+      pixels.push_back(window_.pixel(point));
+      seen = seen || picture.contains(pixels.back());
+    }
   }
+  // Rims below all lines, so that none parts two that meet.
+  const Stroke rim{palette::kBlack, stroke.thickness + 2 * stroke.rim, 0.0};
+  const Stroke inner{stroke.colour, stroke.thickness, stroke.dash_px};
+  for (const auto& line : lines) {
+    if (stroke.rim > 0) draw_polyline(image_, line, rim);
+  }
+  for (const auto& line : lines) draw_polyline(image_, line, inner);
+  return seen;
+}
+
+bool SlicePanel::draw_voxels(const VoxelImage& mask, const Stroke& stroke) {
+  const AffineTransform T_voxel_ras = mask.T_ras_voxel.inverse();
+  cv::Mat inside(image_.size(), CV_8UC1, cv::Scalar(0));
+  for (int y = 0; y < inside.rows; ++y) {
+    for (int x = 0; x < inside.cols; ++x) {
+      const Vec3 place = T_voxel_ras * window_.position({x + 0.5, y + 0.5});
+      const Eigen::Vector3i at = place.array().round().cast<int>();
+      const bool there = (at.array() >= 0).all() && at[0] < mask.dims[0] && at[1] < mask.dims[1] &&
+                         at[2] < mask.dims[2];
+      if (there && mask.at(at[0], at[1], at[2]) > 0.0F) inside.at<std::uint8_t>(y, x) = 1;
+    }
+  }
+  std::vector<std::vector<cv::Point>> edges;
+  cv::findContours(inside, edges, cv::RETR_LIST, cv::CHAIN_APPROX_NONE);
+  for (const auto& edge : edges) {
+    std::vector<cv::Point2d> line(edge.begin(), edge.end());
+    line.push_back(line.front());
+    draw_polyline(image_, line, stroke);
+  }
+  return !edges.empty();
 }
 
 void SlicePanel::draw_orientation(double bar_mm) {

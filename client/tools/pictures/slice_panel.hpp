@@ -60,7 +60,8 @@ SliceSamples sample_slice(const geometry::TetLocator& locator, const SliceWindow
 TriangleSurface deformed_surface(const TriangleSurface& surface,
                                  const geometry::TetLocator& locator, const Points& displacement);
 
-// The segments of plane_section, joined end to end. A closed line repeats its first point.
+// The segments of plane_section, joined end to end. A closed line repeats its first point. Of
+// segments that lie on each other, as those of the two sides of a sheet, there is one.
 std::vector<std::vector<Vec3>> section_polylines(const TriangleSurface& surface, const Vec3& normal,
                                                  double offset);
 
@@ -80,7 +81,10 @@ class SlicePanel {
   // Arrow = magnification x displacement. `thin` draws hairlines in white instead of colours.
   void draw_arrows(const SliceSamples& samples, const Points& displacement, double magnification,
                    double max_mm, bool thin);
-  void draw_section(const TriangleSurface& surface, const Stroke& stroke);
+  // True where any of it lies in the picture.
+  bool draw_section(const TriangleSurface& surface, const Stroke& stroke);
+  // Along the edges of the voxels > 0. True where any of them lies in the picture.
+  bool draw_voxels(const VoxelImage& mask, const Stroke& stroke);
   // The letters of the four sides (R and L, or A and P; A and P, or S and I), and a scale bar of
   // `bar_mm`.
   void draw_orientation(double bar_mm);

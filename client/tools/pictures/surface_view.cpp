@@ -109,23 +109,30 @@ void SurfaceView::draw_through(const TriangleSurface& surface, const cv::Scalar&
   mixed.copyTo(image_, alone.nearest_ > kNothing);
 }
 
-void SurfaceView::draw_on_surface(const std::vector<Vec3>& line, const Stroke& stroke,
+bool SurfaceView::shows(const Vec3& x_ras, double tolerance_mm) const {
+  const cv::Point at = pixel(x_ras);
+  const bool inside = at.x >= 0 && at.y >= 0 && at.x < image_.cols && at.y < image_.rows;
+  return inside && depth(x_ras) >= nearest_(at) - tolerance_mm;
+}
+
+bool SurfaceView::draw_on_surface(const std::vector<Vec3>& line, const Stroke& stroke,
                                   double tolerance_mm) {
-  const auto seen = [&](const Vec3& x) {
-    const cv::Point at = pixel(x);
-    const bool inside = at.x >= 0 && at.y >= 0 && at.x < image_.cols && at.y < image_.rows;
-    return inside && depth(x) >= nearest_(at) - tolerance_mm;
-  };
+  bool drawn = false;
   std::vector<cv::Point2d> part;
-  for (const Vec3& x : line) {
-    if (seen(x)) {
-      part.push_back(pixel(x));
-      continue;
-    }
+  const auto end_part = [&] {
+    drawn = drawn || part.size() > 1;
     draw_polyline(image_, part, stroke);
     part.clear();
+  };
+  for (const Vec3& x : line) {
+    if (shows(x, tolerance_mm)) {
+      part.push_back(pixel(x));
+    } else {
+      end_part();
+    }
   }
-  draw_polyline(image_, part, stroke);
+  end_part();
+  return drawn;
 }
 
 void SurfaceView::draw_axes() {

@@ -35,8 +35,11 @@ class SurfaceView {
   // Laid over what is drawn already, hidden by nothing: how a tumour inside is shown. opacity 0..1.
   void draw_through(const TriangleSurface& surface, const cv::Scalar& colour, double opacity);
   // Only the parts within `tolerance_mm` of what is nearest to the eye are drawn.
-  void draw_on_surface(const std::vector<Vec3>& line, const Stroke& stroke,
+  // True where there is such a part.
+  bool draw_on_surface(const std::vector<Vec3>& line, const Stroke& stroke,
                        double tolerance_mm = 2.0);
+  // Whether a place is in the picture, with nothing more than `tolerance_mm` before it.
+  bool shows(const Vec3& x_ras, double tolerance_mm = 2.0) const;
   // Arrows along R, A and S with their letters, in the lower left corner.
   void draw_axes();
   // As on slices: an arrow named "gravity" in the upper left corner.

@@ -6,13 +6,17 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <iterator>
 #include <map>
 #include <numbers>
 #include <numeric>
 #include <utility>
 
+#include "common/anatomy/brain_labels.hpp"
 #include "common/anatomy/brain_mesh.hpp"
 #include "common/anatomy/brain_model_builder.hpp"
+#include "common/anatomy/given_inputs.hpp"
+#include "common/anatomy/mask_leak.hpp"
 #include "common/geometry/closest_point.hpp"
 #include "common/geometry/mask.hpp"
 #include "common/geometry/surface.hpp"
@@ -61,11 +65,56 @@ void take_model(CaseView& view, const BrainModel& model) {
   view.slave_plane_depth_mm = model.slave_plane_depth_mm;
 }
 
+// 1 where `is` takes a value; none where it takes no value.
+template <typename Is>
+std::optional<VoxelImage> mask_of(VoxelImage image, const Is& is) {
+  bool any = false;
+  for (float& v : image.values) {
+    const bool in = std::isfinite(v) && is(v);
+    any = any || in;
+    v = in ? 1.0F : 0.0F;
+  }
+  return any ? std::optional(std::move(image)) : std::nullopt;
+}
+
+int label_of(float value) { return static_cast<int>(std::lround(value)); }
+
+std::optional<VoxelImage> brain_of_labels(const CaseInputs& inputs) {
+  if (!inputs.labels) return {};
+  const bool aal = inputs.config.anatomy.numbers == LabelNumbers::kAal;
+  VoxelImage map = aal ? anatomy::with_freesurfer_numbers_of_aal(*inputs.labels) : *inputs.labels;
+  if (!aal && !inputs.label_names.empty()) {
+    map = anatomy::with_freesurfer_numbers(map, inputs.label_names).value_or(std::move(map));
+  }
+  auto brain = anatomy::brain_from_labels(map);
+  return brain ? std::optional(std::move(*brain)) : std::nullopt;
+}
+
 // The parts of a model that can be made although the whole cannot.
-void take_parts(CaseView& view, const CaseInputs& inputs, const Progress& progress) {
-  if (auto tumour = anatomy::make_tumour_surface(inputs)) view.tumour = std::move(*tumour);
+void take_parts(CaseView& view, CaseInputs inputs, const Progress& progress) {
+  if (view.problems.front().starts_with("anatomy.labels")) {
+    view.label_voxels = brain_of_labels(inputs);
+  }
+  if (auto tumour = anatomy::make_tumour_surface(inputs)) {
+    view.tumour = std::move(*tumour);
+  } else {
+    if (const auto* label = std::get_if<TumourLabel>(&inputs.config.tumour);
+        label != nullptr && inputs.tumour_labels) {
+      view.tumour_voxels = mask_of(*inputs.tumour_labels, [label](float v) {
+        return std::find(label->labels.begin(), label->labels.end(), label_of(v)) !=
+               label->labels.end();
+      });
+    }
+    // No finer edges about a tumour that is not there.
+    if (auto* settings = std::get_if<MeshGeneration>(&inputs.config.mesh)) {
+      settings->tumour_edge_mm = settings->edge_mm;
+    }
+  }
   const auto mesh = anatomy::make_brain_mesh(inputs, view.tumour, progress);
-  if (!mesh) return;
+  if (!mesh) {
+    if (inputs.brain) view.brain_voxels = mask_of(*inputs.brain, [](float v) { return v > 0.0F; });
+    return;
+  }
   const anatomy::BrainSurface brain = anatomy::brain_surface_of(*mesh);
   view.brain = brain.surface;
   view.nodes = mesh->num_nodes();
@@ -114,23 +163,31 @@ double degrees_between(const Vec3& a, const Vec3& b) {
 Result<CaseView> view_case(const std::filesystem::path& case_file, const Progress& progress) {
   auto config = io::read_case_config(case_file);
   if (!config) return tl::unexpected(config.error());
-  const auto inputs = io::load_case_inputs(*config);
-  if (!inputs) return tl::unexpected(inputs.error());
+  const io::ReadableInputs read = io::load_readable_inputs(*config);
+  const CaseInputs& inputs = read.inputs;
   CaseView view;
   view.config = *config;
   if (!config->mri.empty()) {
     auto mri = io::read_volume(config->mri);
-    if (!mri) return tl::unexpected(mri.error());
-    view.background = std::move(*mri);
-  } else if (inputs->brain) {
-    view.background = *inputs->brain;
+    // That it is not there is among the inputs' errors.
+    if (!mri && read.status) return tl::unexpected(mri.error());
+    if (mri) view.background = std::move(*mri);
   }
-  const auto model = anatomy::build_brain_model(*inputs, progress, &view.notes);
+  if (!view.background) view.background = inputs.brain;
+  if (!read.status && !view.background && !inputs.mesh) return tl::unexpected(read.status.error());
+  const auto model = read.status ? anatomy::build_brain_model(inputs, progress, &view.notes)
+                                 : Result<BrainModel>(tl::unexpected(read.status.error()));
   if (model) {
     take_model(view, *model);
   } else {
     view.problems.push_back(model.error().message);
-    take_parts(view, *inputs, progress);
+    take_parts(view, inputs, progress);
+  }
+  if (inputs.brain) {
+    if (const auto mask = anatomy::brain_mask(*inputs.brain, {}, nullptr)) {
+      const anatomy::MaskLeak leak = anatomy::mask_leak(*mask);
+      view.leak_mm3 = leak.volume_mm3, view.leak_centre = leak.centre;
+    }
   }
   if (view.brain.num_vertices() > 0) {
     view.projection_mm = distance_to_surface(config->craniotomy.centre_mm, view.brain);
@@ -141,6 +198,12 @@ Result<CaseView> view_case(const std::filesystem::path& case_file, const Progres
 Vec3 centre_of(const TriangleSurface& surface) {
   if (surface.num_vertices() == 0) return Vec3::Zero();
   return surface.vertices.rowwise().mean();
+}
+
+std::optional<Vec3> tumour_centre(const CaseView& view) {
+  if (view.tumour.num_vertices() > 0) return centre_of(view.tumour);
+  if (view.tumour_voxels) return geometry::mask_centre(*view.tumour_voxels).centre;
+  return {};
 }
 
 std::optional<OpeningView> opening_of(const CaseView& view) {
@@ -200,6 +263,15 @@ std::vector<std::string> facts(const CaseView& view) {
                                 geometry::enclosed_volume(view.tumour) / kMm3PerCc,
                                 place_text(centre_of(view.tumour))));
   }
+  if (view.tumour_voxels) {
+    lines.push_back(fmt::format("tumour: {:.2f} cc of voxels at {}; no surface can be made of them",
+                                geometry::mask_centre(*view.tumour_voxels).volume_mm3 / kMm3PerCc,
+                                place_text(*tumour_centre(view))));
+  }
+  if (view.brain_voxels) {
+    lines.push_back(fmt::format("brain: {:.0f} cc of voxels; no mesh can be made of them",
+                                geometry::mask_centre(*view.brain_voxels).volume_mm3 / kMm3PerCc));
+  }
   if (view.septa.triangles.cols() > 0) {
     lines.push_back(fmt::format("falx and tentorium: {:.0f} cm2",
                                 0.5 * geometry::area(view.septa) / kMm2PerCm2));
@@ -229,6 +301,8 @@ std::vector<std::string> facts(const CaseView& view) {
                     count(view, NodeRole::kCraniotomy), count(view, NodeRole::kSlave),
                     count(view, NodeRole::kBrainstem), count(view, NodeRole::kFixed)));
   }
+  std::copy_if(view.notes.begin(), view.notes.end(), std::back_inserter(lines),
+               anatomy::asks_nothing);
   return lines;
 }
 
@@ -320,7 +394,9 @@ void doubt_opening(const CaseView& view, const OpeningView& opening,
 }  // namespace
 
 std::vector<std::string> doubts(const CaseView& view) {
-  std::vector<std::string> lines = view.notes;
+  std::vector<std::string> lines;
+  std::remove_copy_if(view.notes.begin(), view.notes.end(), std::back_inserter(lines),
+                      anatomy::asks_nothing);
   if (view.brain.num_vertices() == 0) return lines;
   const double longest = extent_of(view.brain).maxCoeff();
   if (longest < kShortBrain_mm || longest > kLongBrain_mm) {
@@ -330,6 +406,12 @@ std::vector<std::string> doubts(const CaseView& view) {
         longest));
   }
   doubt_volume(view, lines);
+  if (view.leak_mm3 > anatomy::kLeak_mm3) {
+    lines.push_back(fmt::format(
+        "{:.0f} cc of images.brain hang on the rest by a thin neck, at {}: did the mask leak into "
+        "an orbit, the scalp or the skull?",
+        view.leak_mm3 / kMm3PerCc, place_text(view.leak_centre)));
+  }
   doubt_mri(view, lines);
   doubt_projection(view, lines);
   if (const auto opening = opening_of(view)) doubt_opening(view, *opening, lines);

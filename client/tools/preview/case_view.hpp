@@ -35,17 +35,26 @@ struct CaseView {
   // Along gravity, mm; with roles only.
   double fluid_plane_depth_mm = 0.0;
   double slave_plane_depth_mm = 0.0;
+  // Of a case that cannot be prepared: 1 where the tumour and the brain are of which no surface can
+  // be made, and, where anatomy.labels is to blame, where the brain of that map is.
+  std::optional<VoxelImage> tumour_voxels, brain_voxels, label_voxels;
+  // Of images.brain: what hangs on the rest by a thin neck (anatomy::mask_leak).
+  double leak_mm3 = 0.0;
+  Vec3 leak_centre = Vec3::Zero();
   // What the builder made of the inputs (anatomy::build_brain_model).
   std::vector<std::string> notes;
   // Each ends the preparation of the case.
   std::vector<std::string> problems;
 };
 
-// Errors: of reading the case and the files that it names. Whatever else is wrong is a problem.
+// Errors: of reading the case, or its MRI, or when none of its images can be read. Whatever else is
+// wrong is a problem.
 Result<CaseView> view_case(const std::filesystem::path& case_file, const Progress& progress = {});
 
 // Mean of a surface's vertices.
 Vec3 centre_of(const TriangleSurface& surface);
+// Of its surface, or else of its voxels. None where there is neither.
+std::optional<Vec3> tumour_centre(const CaseView& view);
 // Where the head is opened: means over the craniotomy's nodes. Without roles, the vertex nearest to
 // craniotomy.centre_mm.
 struct OpeningView {
@@ -61,7 +70,8 @@ std::string place_text(const Vec3& x_ras);
 // "inferior 0.92, anterior 0.35, left 0.20".
 std::string direction_text(const Vec3& direction);
 
-// What the pictures show, as sentences with figures: sizes, places, distances, angles.
+// What the pictures show, as sentences with figures: sizes, places, distances, angles; and what the
+// builder noted that asks nothing of anybody (anatomy::asks_nothing).
 std::vector<std::string> facts(const CaseView& view);
 
 // How well the brain's surface lies in a T1 MRI: there the brain, 3 mm below the surface, is
@@ -76,13 +86,14 @@ std::optional<MriFit> fit_of_mri(const CaseView& view);
 
 // What is unusual enough for a second look: each a sentence that names the key to look at. A wrong
 // side, a wrong axis and metres for millimetres show here.
-//   what the builder noted: a tumour that sticks out of the brain and is cut
+//   what else the builder noted: a tumour that sticks out of the brain and is cut
 //   tumour and opening on different sides of the brain, each more than 10 mm from its middle
 //   an opening farther than 60 mm from the tumour's surface
 //   an opening that faces down: the brain would sag out of it
 //   craniotomy.centre_mm farther than 10 mm from the surface that it is projected to; centimetres
 //   where ten times the centre lies on it
 //   a brain not between 100 and 220 mm long, or not of 900 to 1900 cc
+//   a mask that has leaked (anatomy::mask_leak: above 5 cc)
 //   a brain that is not in its place in the MRI (fit_of_mri: contrast below 0.2, or more than
 //   0.15 dark)
 //   a brainstem above the brain's centre

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <limits>
 #include <opencv2/core.hpp>
 #include <tuple>
 #include <utility>
@@ -12,6 +13,7 @@
 #include "client/tools/pictures/sheet.hpp"
 #include "client/tools/pictures/slice_panel.hpp"
 #include "client/tools/pictures/surface_view.hpp"
+#include "common/geometry/mask.hpp"
 #include "common/io/files/file_access.hpp"
 
 namespace brainshift::client {
@@ -21,10 +23,13 @@ constexpr double kMargin_mm = 12.0;
 constexpr double kSlice_px_per_mm = 4.0;
 
 const Stroke kTumour{palette::kOrange, 5, 0.0};
-const Stroke kSeptum{palette::kGreen, 5, 0.0};
-const Stroke kVentricle{palette::kVermillion, 4, 0.0};
+const Stroke kSeptum{meaning::kSeptum, 5, 0.0, 2};
+const Stroke kVentricle{meaning::kVentricle, 4, 0.0};
+const Stroke kLabels{palette::kYellow, 4, 14.0};
 const Stroke kFluidPlane{palette::kBlue, 4, 0.0};
 const Stroke kSlavePlane{palette::kBlue, 4, 12.0};
+
+const LegendEntry kPlainBrain{"brain", {palette::kPale, 5, 0.0}};
 
 struct RoleStyle {
   NodeRole role;
@@ -49,6 +54,15 @@ NodeRole role_of_triangle(const CaseView& view, int triangle) {
   return corner(1) == corner(2) ? corner(1) : corner(0);
 }
 
+// Precondition: roles.
+bool shows_role(const SurfaceView& picture, const CaseView& view, NodeRole role) {
+  for (std::size_t v = 0; v < view.roles.size(); ++v) {
+    if (view.roles[v] != role) continue;
+    if (picture.shows(view.brain.vertices.col(static_cast<Eigen::Index>(v)))) return true;
+  }
+  return false;
+}
+
 TriangleSurface part_with_role(const CaseView& view, NodeRole role) {
   TriangleSurface part{view.brain.vertices, {}};
   std::vector<int> kept;
@@ -59,21 +73,51 @@ TriangleSurface part_with_role(const CaseView& view, NodeRole role) {
   return part;
 }
 
-// What bounds the pictures: the brain, or the tumour when there is no brain.
-const TriangleSurface& shown(const CaseView& view) {
-  return view.brain.num_vertices() > 0 ? view.brain : view.tumour;
+// Bounds of what a picture must show.
+class Box {
+ public:
+  void add(const Points& points) {
+    if (points.cols() == 0) return;
+    low_ = low_.cwiseMin(points.rowwise().minCoeff());
+    high_ = high_.cwiseMax(points.rowwise().maxCoeff());
+  }
+  void add(const std::optional<VoxelImage>& mask) {
+    if (!mask) return;
+    geometry::for_each_voxel(
+        *mask, [](float v) { return v > 0.0F; }, [this](std::size_t, const Vec3& x) { add(x); });
+  }
+  void add(const Vec3& x) { low_ = low_.cwiseMin(x), high_ = high_.cwiseMax(x); }
+  bool empty() const { return (low_.array() > high_.array()).any(); }
+  Vec3 low() const { return low_.array() - kMargin_mm; }
+  Vec3 high() const { return high_.array() + kMargin_mm; }
+  Vec3 middle() const { return 0.5 * (low_ + high_); }
+
+ private:
+  Vec3 low_ = Vec3::Constant(std::numeric_limits<double>::infinity());
+  Vec3 high_ = Vec3::Constant(-std::numeric_limits<double>::infinity());
+};
+
+// The tumour and the brain of a label map, wherever they lie; without any of these the image.
+Box box_of(const CaseView& view) {
+  Box box;
+  box.add(view.brain.vertices);
+  box.add(view.tumour.vertices);
+  for (const auto* mask : {&view.brain_voxels, &view.tumour_voxels, &view.label_voxels}) {
+    box.add(*mask);
+  }
+  if (!box.empty() || !view.background) return box;
+  const auto& dims = view.background->dims;
+  for (int corner = 0; corner < 8; ++corner) {
+    const auto end = [&](int axis) {
+      return (corner >> axis & 1) * (dims[static_cast<std::size_t>(axis)] - 1);
+    };
+    box.add(Vec3(view.background->T_ras_voxel * Vec3(end(0), end(1), end(2))));
+  }
+  return box;
 }
 
-SliceWindow window_of(const CaseView& view, Plane plane, const Vec3& through) {
-  // The tumour is shown wherever it lies.
-  Vec3 low = shown(view).vertices.rowwise().minCoeff();
-  Vec3 high = shown(view).vertices.rowwise().maxCoeff();
-  if (view.tumour.num_vertices() > 0) {
-    low = low.cwiseMin(view.tumour.vertices.rowwise().minCoeff());
-    high = high.cwiseMax(view.tumour.vertices.rowwise().maxCoeff());
-  }
-  low.array() -= kMargin_mm;
-  high.array() += kMargin_mm;
+SliceWindow window_of(const Box& box, Plane plane, const Vec3& through) {
+  const Vec3 low = box.low(), high = box.high();
   SliceWindow window{plane, 0.0, 0.0, 0.0, 0.0, 0.0, kSlice_px_per_mm};
   window.offset_mm = through(window.normal_axis());
   window.across_min = low(window.across_axis());
@@ -81,15 +125,6 @@ SliceWindow window_of(const CaseView& view, Plane plane, const Vec3& through) {
   window.up_min = low(window.up_axis());
   window.up_max = high(window.up_axis());
   return window;
-}
-
-void add_role_legend(const CaseView& view, Sheet& sheet) {
-  if (view.roles.empty()) {
-    if (view.brain.num_vertices() > 0) sheet.legend.push_back({"brain", {palette::kPale, 5, 0.0}});
-    return;
-  }
-  for (const RoleStyle& style : kRoles)
-    sheet.legend.push_back({style.name, {style.colour, 8, 0.0}});
 }
 
 std::string problem_text(const CaseView& view) {
@@ -106,27 +141,39 @@ std::vector<cv::Scalar> triangle_colours(const CaseView& view) {
   return colours;
 }
 
-SurfaceView surface_from(const CaseView& view, const Vec3& towards) {
-  const TriangleSurface& bounds = shown(view);
-  const Vec3 low = bounds.vertices.rowwise().minCoeff();
-  const Vec3 high = bounds.vertices.rowwise().maxCoeff();
+// Adds a panel, and to the legend what can be seen in it.
+void add_surface(const CaseView& view, Sheet& sheet, const std::string& title,
+                 const Vec3& towards) {
+  const Vec3 low = view.brain.vertices.rowwise().minCoeff();
+  const Vec3 high = view.brain.vertices.rowwise().maxCoeff();
   ViewPoint point = view_from(towards, 0.5 * (low + high));
   point.half_width_mm = 0.5 * (high - low).norm() / std::sqrt(2.0) + kMargin_mm;
   SurfaceView picture(point);
   picture.draw_surface(view.brain, triangle_colours(view));
+  for (const RoleStyle& style : kRoles) {
+    if (view.roles.empty()) break;
+    if (shows_role(picture, view, style.role)) {
+      name_in_legend(sheet, {style.name, {style.colour, 8, 0.0}});
+    }
+  }
+  if (view.roles.empty() && view.brain.num_vertices() > 0) name_in_legend(sheet, kPlainBrain);
   picture.draw_through(view.tumour, palette::kOrange, 0.75);
+  if (view.tumour.num_triangles() > 0) {
+    name_in_legend(sheet, {"tumour", {palette::kOrange, 10, 0.0}});
+  }
   if (!view.roles.empty()) {
     const Vec3 gravity = view.config.gravity_direction.normalized();
-    for (const auto& [depth, stroke] : {std::pair{view.fluid_plane_depth_mm, kFluidPlane},
-                                        std::pair{view.slave_plane_depth_mm, kSlavePlane}}) {
+    for (const auto& [depth, entry] :
+         {std::pair{view.fluid_plane_depth_mm, LegendEntry{"fluid plane", kFluidPlane}},
+          std::pair{view.slave_plane_depth_mm, LegendEntry{"second plane", kSlavePlane}}}) {
       for (const auto& line : section_polylines(view.brain, gravity, depth)) {
-        picture.draw_on_surface(line, stroke);
+        if (picture.draw_on_surface(line, entry.stroke)) name_in_legend(sheet, entry);
       }
     }
   }
   picture.draw_axes();
   picture.draw_gravity(view.config.gravity_direction.normalized());
-  return picture;
+  sheet.panels.push_back({title, picture.image()});
 }
 
 namespace fs = std::filesystem;
@@ -141,30 +188,36 @@ std::string summary_text(const PreviewSummary& summary) {
 
 // Axial, coronal and sagittal plane through a point, mm RAS. place: what is there, for the title.
 cv::Mat slices_picture(const CaseView& view, const Vec3& through, const std::string& place) {
+  const Box box = box_of(view);
   Sheet sheet;
   sheet.title = "Case " + view.config.case_id + ": planes through the " + place;
   sheet.subtitle = problem_text(view);
   if (sheet.subtitle.empty()) sheet.subtitle = "at " + place_text(through) + "; radiological view";
-  add_role_legend(view, sheet);
-  sheet.legend.push_back({"tumour", kTumour});
-  if (view.septa.num_triangles() > 0) sheet.legend.push_back({"falx, tentorium", kSeptum});
-  if (view.ventricles.num_triangles() > 0) sheet.legend.push_back({"ventricles", kVentricle});
   for (const auto& [plane, name, letter] :
        {std::tuple{Plane::kAxial, "axial", "S"}, std::tuple{Plane::kCoronal, "coronal", "A"},
         std::tuple{Plane::kSagittal, "sagittal", "R"}}) {
-    const SliceWindow window = window_of(view, plane, through);
+    const SliceWindow window = window_of(box, plane, through);
     SlicePanel panel(window);
     if (view.background) panel.draw_mri(*view.background, 0.8);
+    const auto draw = [&](const TriangleSurface& surface, const LegendEntry& entry) {
+      if (panel.draw_section(surface, entry.stroke)) name_in_legend(sheet, entry);
+    };
     if (view.roles.empty()) {
-      panel.draw_section(view.brain, {palette::kPale, 4, 0.0});
+      draw(view.brain, kPlainBrain);
     } else {
       for (const RoleStyle& style : kRoles) {
-        panel.draw_section(part_with_role(view, style.role), {style.colour, 5, 0.0});
+        draw(part_with_role(view, style.role), {style.name, {style.colour, 5, 0.0}});
       }
     }
-    panel.draw_section(view.septa, kSeptum);
-    panel.draw_section(view.ventricles, kVentricle);
-    panel.draw_section(view.tumour, kTumour);
+    draw(view.ventricles, {"ventricles", kVentricle});
+    draw(view.septa, {"falx, tentorium", kSeptum});
+    draw(view.tumour, {"tumour", kTumour});
+    const auto draw_voxels = [&](const std::optional<VoxelImage>& mask, const LegendEntry& entry) {
+      if (mask && panel.draw_voxels(*mask, entry.stroke)) name_in_legend(sheet, entry);
+    };
+    draw_voxels(view.brain_voxels, {"voxels of images.brain", kPlainBrain.stroke});
+    draw_voxels(view.label_voxels, {"brain of anatomy.labels", kLabels});
+    draw_voxels(view.tumour_voxels, {"voxels of the tumour", {palette::kOrange, 3, 0.0}});
     panel.draw_orientation(20.0);
     panel.draw_gravity(view.config.gravity_direction.normalized());
     sheet.panels.push_back(
@@ -183,19 +236,13 @@ cv::Mat surface_picture(const CaseView& view) {
   if (sheet.subtitle.empty())
     sheet.subtitle =
         "the tumour shines through; arrows R, A, S point to the patient's right, front and top";
-  add_role_legend(view, sheet);
-  sheet.legend.push_back({"tumour", {palette::kOrange, 10, 0.0}});
-  if (!view.roles.empty()) {
-    sheet.legend.push_back({"fluid plane", kFluidPlane});
-    sheet.legend.push_back({"second plane", kSlavePlane});
-  }
   const auto opening = opening_of(view);
-  const Vec3 side = centre_of(view.tumour).x() < 0.0 ? Vec3(-Vec3::UnitX()) : Vec3(Vec3::UnitX());
-  if (opening)
-    sheet.panels.push_back({"from the opening", surface_from(view, opening->normal).image()});
-  sheet.panels.push_back({side.x() > 0.0 ? "from the patient's right" : "from the patient's left",
-                          surface_from(view, side).image()});
-  sheet.panels.push_back({"from the front", surface_from(view, Vec3::UnitY()).image()});
+  const bool left = tumour_centre(view).value_or(Vec3::Zero()).x() < 0.0;
+  const Vec3 side = left ? Vec3(-Vec3::UnitX()) : Vec3(Vec3::UnitX());
+  if (opening) add_surface(view, sheet, "from the opening", opening->normal);
+  add_surface(view, sheet, side.x() > 0.0 ? "from the patient's right" : "from the patient's left",
+              side);
+  add_surface(view, sheet, "from the front", Vec3::UnitY());
   return compose(sheet);
 }
 
@@ -210,15 +257,22 @@ Result<PreviewSummary> write_preview(const fs::path& case_file, const fs::path& 
   if (failed) return io::write_failed(out, failed.message());
   PreviewSummary summary{facts(*view), doubts(*view), view->problems, {}};
   std::vector<std::pair<std::string, cv::Mat>> pictures;
-  if (view->tumour.num_vertices() > 0) {
-    pictures.emplace_back("slices-tumour.png",
-                          slices_picture(*view, centre_of(view->tumour), "tumour's centre"));
+  if (const auto centre = tumour_centre(*view)) {
+    pictures.emplace_back("slices-tumour.png", slices_picture(*view, *centre, "tumour's centre"));
+  } else if (const Box box = box_of(*view); !box.empty()) {
+    pictures.emplace_back("slices-middle.png",
+                          slices_picture(*view, box.middle(), "middle of what there is"));
   }
   if (const auto opening = opening_of(*view)) {
     pictures.emplace_back("slices-craniotomy.png",
                           slices_picture(*view, opening->centre, "craniotomy's centre"));
   }
   if (view->brain.num_vertices() > 0) pictures.emplace_back("surface.png", surface_picture(*view));
+  // Those of an earlier run would show another case.
+  for (const char* name :
+       {"slices-tumour.png", "slices-middle.png", "slices-craniotomy.png", "surface.png"}) {
+    fs::remove(out / name, failed);
+  }
   for (const auto& [name, image] : pictures) {
     const auto png = encode_png((out / name).string(), image);
     if (!png) return tl::unexpected(png.error());

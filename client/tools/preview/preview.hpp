@@ -3,12 +3,15 @@
 // surgery: planes with outlines on the MRI, and the surface of the brain from outside.
 //
 // DIR/slices-tumour.png      three planes through the tumour's centre
+// DIR/slices-middle.png      three planes through the middle of what there is, where there is no
+//                            tumour
 // DIR/slices-craniotomy.png  three planes through the craniotomy's centre, when it has nodes
 // DIR/surface.png            the brain as seen through the opening, from a side and from the front
 // DIR/preview.txt            the facts, doubts and problems of case_view.hpp, a line each
 //
 // Outlines and surfaces show what a node of the brain's surface is to the mechanics. Whatever a
-// case lacks is not drawn; its first problem is in the subtitle.
+// case lacks is not drawn, and of what no surface can be made the voxels are; its first problem is
+// in the subtitle. Pictures of an earlier run that are not written again are removed.
 #pragma once
 
 #include <filesystem>

@@ -22,11 +22,11 @@ constexpr double kArrowSpacing_mm = 9.0;
 constexpr double kMapSpacing_mm = 1.0;
 constexpr double kDifferenceFactor = 5.0;  // "magnified five times for visualization", paper Fig. 4
 
-const Stroke kSliceBefore{palette::kWhite, 3, 12.0};
-const Stroke kSliceTrue{palette::kSkyBlue, 8, 0.0};
-const Stroke kSliceEstimated{palette::kOrange, 3, 0.0};
-const Stroke kSliceSepta{palette::kGreen, 3, 0.0};
-const Stroke kSliceVentricles{palette::kVermillion, 3, 0.0};
+const Stroke kSliceBefore{meaning::kBefore, 3, 12.0};
+const Stroke kSliceTrue{meaning::kTrue, 8, 0.0};
+const Stroke kSliceEstimated{meaning::kEstimated, 3, 0.0};
+const Stroke kSliceSepta{meaning::kSeptum, 5, 0.0, 2};
+const Stroke kSliceVentricles{meaning::kVentricle, 3, 0.0};
 
 struct Estimated {
   std::string boundary;
@@ -100,33 +100,30 @@ TriangleSurface moved_brain(const Scene& scene, const Points& displacement) {
   return moved;
 }
 
-void draw_tumour(SlicePanel& panel, const Scene& scene, const Points& estimate) {
-  if (scene.head.tumour.num_triangles() == 0) return;
+// The legend names it where any of it lies in the picture.
+void draw_named(SlicePanel& panel, Sheet& sheet, const TriangleSurface& surface,
+                const LegendEntry& entry) {
+  if (panel.draw_section(surface, entry.stroke)) name_in_legend(sheet, entry);
+}
+
+void draw_tumour(SlicePanel& panel, Sheet& sheet, const std::string& what, const Scene& scene,
+                 const Points& estimate) {
+  const TriangleSurface& tumour = scene.head.tumour;
+  if (tumour.num_triangles() == 0) return;
   if (scene.truth != nullptr) {
-    panel.draw_section(deformed_surface(scene.head.tumour, scene.locator, *scene.truth),
-                       kSliceTrue);
+    draw_named(panel, sheet, deformed_surface(tumour, scene.locator, *scene.truth),
+               {what + " true", kSliceTrue});
   }
-  panel.draw_section(deformed_surface(scene.head.tumour, scene.locator, estimate), kSliceEstimated);
-  panel.draw_section(scene.head.tumour, kSliceBefore);
+  draw_named(panel, sheet, deformed_surface(tumour, scene.locator, estimate),
+             {what + " estimated", kSliceEstimated});
+  draw_named(panel, sheet, tumour, {what + " before", kSliceBefore});
 }
 
-// Falx, tentorium and ventricles before, where the model has them.
-void draw_anatomy(SlicePanel& panel, const Scene& scene) {
-  panel.draw_section(scene.head.septa, kSliceSepta);
-  panel.draw_section(scene.head.ventricles, kSliceVentricles);
-}
-void add_anatomy(std::vector<LegendEntry>& legend, const Scene& scene) {
-  if (scene.head.septa.num_triangles() > 0) legend.push_back({"falx, tentorium", kSliceSepta});
-  if (scene.head.ventricles.num_triangles() > 0) {
-    legend.push_back({"ventricles before", kSliceVentricles});
-  }
-}
-
-std::vector<LegendEntry> outline_legend(const Scene& scene, const std::string& what) {
-  std::vector<LegendEntry> legend = {{what + " before", kSliceBefore},
-                                     {what + " estimated", kSliceEstimated}};
-  if (scene.truth != nullptr) legend.push_back({what + " true", kSliceTrue});
-  return legend;
+// Falx, tentorium and ventricles before, where the model has them. After maps and arrows, which
+// would hide a sheet.
+void draw_anatomy(SlicePanel& panel, Sheet& sheet, const Scene& scene) {
+  draw_named(panel, sheet, scene.head.ventricles, {"ventricles before", kSliceVentricles});
+  draw_named(panel, sheet, scene.head.septa, {"falx, tentorium", kSliceSepta});
 }
 
 std::string slice_name(const Scene& scene, const SliceWindow& window, const char* through) {
@@ -154,18 +151,15 @@ cv::Mat shift_sheet(const Scene& scene, Plane plane) {
                    trimmed(magnification) + "x: their part in the plane, coloured by full length";
   sheet.colour_max = round_up(largest);
   sheet.colour_label = "displacement (mm)";
-  sheet.legend = outline_legend(scene, "tumour");
-  if (scene.truth != nullptr)
-    sheet.legend.push_back({"true displacement", {palette::kWhite, 1, 0.0}});
-  add_anatomy(sheet.legend, scene);
   for (const Estimated& e : scene.estimates) {
     SlicePanel panel = background(scene, window, 0.7);
-    draw_anatomy(panel, scene);
     panel.draw_arrows(samples, *e.displacement, magnification, sheet.colour_max, false);
     if (scene.truth != nullptr) {
       panel.draw_arrows(samples, *scene.truth, magnification, sheet.colour_max, true);
+      name_in_legend(sheet, {"true displacement", {palette::kWhite, 1, 0.0}});
     }
-    draw_tumour(panel, scene, *e.displacement);
+    draw_anatomy(panel, sheet, scene);
+    draw_tumour(panel, sheet, "tumour", scene, *e.displacement);
     panel.draw_orientation(20.0);
     panel.draw_gravity(scene.head.gravity_direction);
     sheet.panels.push_back({e.boundary + " boundary", panel.image()});
@@ -179,13 +173,15 @@ cv::Mat close_up_sheet(const Scene& scene, Plane plane) {
   Sheet sheet;
   sheet.title = "Tumour and brain surface: " + scene.scenario;
   sheet.subtitle = slice_name(scene, window, "tumour centre") + "; displacements at true scale";
-  sheet.legend = outline_legend(scene, "outline");
   for (const Estimated& e : scene.estimates) {
     SlicePanel panel = background(scene, window, 0.8);
-    if (scene.truth != nullptr) panel.draw_section(moved_brain(scene, *scene.truth), kSliceTrue);
-    panel.draw_section(moved_brain(scene, *e.displacement), kSliceEstimated);
-    panel.draw_section(scene.brain, kSliceBefore);
-    draw_tumour(panel, scene, *e.displacement);
+    if (scene.truth != nullptr) {
+      draw_named(panel, sheet, moved_brain(scene, *scene.truth), {"outline true", kSliceTrue});
+    }
+    draw_named(panel, sheet, moved_brain(scene, *e.displacement),
+               {"outline estimated", kSliceEstimated});
+    draw_named(panel, sheet, scene.brain, {"outline before", kSliceBefore});
+    draw_tumour(panel, sheet, "outline", scene, *e.displacement);
     panel.draw_orientation(10.0);
     sheet.panels.push_back({e.boundary + " boundary", panel.image()});
   }
@@ -212,11 +208,10 @@ cv::Mat difference_sheet(const Scene& scene) {
                    "x, differences first multiplied by the factor in their title";
   sheet.colour_max = round_up(largest);
   sheet.colour_label = "length, with the title's factor (mm)";
-  add_anatomy(sheet.legend, scene);
   const auto add = [&](const std::string& title, const Points& field) {
     SlicePanel panel = background(scene, window, 0.7);
-    draw_anatomy(panel, scene);
     panel.draw_arrows(samples, field, magnification, sheet.colour_max, false);
+    draw_anatomy(panel, sheet, scene);
     panel.draw_orientation(20.0);
     panel.draw_gravity(scene.head.gravity_direction);
     sheet.panels.push_back({title, panel.image()});
@@ -247,15 +242,13 @@ cv::Mat map_sheet(const Scene& scene, const std::function<Points(const Estimated
   sheet.title += ": " + scene.scenario;
   sheet.subtitle =
       slice_name(scene, window, "craniotomy centre") + "; one colour scale for all panels";
-  sheet.legend = {{"tumour before", kSliceBefore}};
-  add_anatomy(sheet.legend, scene);
   for (const Estimated& e : scene.estimates) {
     const Points field = field_of(e);
     if (field.cols() == 0) continue;
     SlicePanel panel = background(scene, window, 0.9);
     panel.draw_magnitude_map(samples, field, sheet.colour_max, 0.7);
-    draw_anatomy(panel, scene);
-    panel.draw_section(scene.head.tumour, kSliceBefore);
+    draw_anatomy(panel, sheet, scene);
+    draw_named(panel, sheet, scene.head.tumour, {"tumour before", kSliceBefore});
     panel.draw_orientation(20.0);
     sheet.panels.push_back({e.boundary + " boundary", panel.image()});
   }
@@ -274,9 +267,9 @@ constexpr double kHalf_mm = 50.0;
 constexpr double kPx_per_mm = 6.0;
 constexpr double kBar_mm = 20.0;
 
-const Stroke kBefore{palette::kWhite, 2, 10.0};
-const Stroke kTrue{palette::kSkyBlue, 5, 0.0};
-const Stroke kEstimated{palette::kOrange, 2, 0.0};
+const Stroke kBefore{meaning::kBefore, 2, 10.0};
+const Stroke kTrue{meaning::kTrue, 5, 0.0};
+const Stroke kEstimated{meaning::kEstimated, 2, 0.0};
 
 // The tumour before, estimated and, where it is known, true.
 struct Outlines {

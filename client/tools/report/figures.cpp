@@ -31,8 +31,8 @@ std::optional<Figure> convergence_figure(const RunGroup& group, const RunReport&
     to.points.push_back({static_cast<double>(iteration), value, ""});
   };
   Series sparse = series("sparse data", palette::kBlue, Marker::kCircle);
-  Series cross = series("cross-validation", palette::kVermillion, Marker::kSquare);
-  Series penetrating = series("penetrating nodes (right)", palette::kGreen, Marker::kTriangle);
+  Series cross = series("cross-validation", palette::kPurple, Marker::kSquare);
+  Series penetrating = series("penetrating nodes (right)", palette::kInk, Marker::kTriangle);
   penetrating.dash_px = 14.0;
   penetrating.right_axis = true;
   if (run.error_mm.sparse_initial) add(sparse, 0, run.error_mm.sparse_initial->mean);
@@ -90,11 +90,11 @@ std::vector<Figure> course_figures(const RunGroup& group, const RunReport& run) 
   const Strip strips[] = {
       {"motion", "motion of the tumour (mm)",
        "Mean motion of the tumour's nodes, the band its standard deviation, after every update",
-       &CoursePoint::tumour_mm, palette::kBlue},
+       &CoursePoint::tumour_mm, meaning::kEstimated},
       {"misfit", "misfit (mm)", "Mean misfit at the data, after every update",
-       &CoursePoint::misfit_mm, palette::kVermillion},
+       &CoursePoint::misfit_mm, palette::kBlue},
       {"latency", "time of the update (ms)", "From sending an observation to having its update",
-       &CoursePoint::latency_ms, palette::kGreen}};
+       &CoursePoint::latency_ms, palette::kInk}};
   std::vector<Figure> figures;
   for (const Strip& strip : strips) {
     if (!has(strip.value)) continue;
@@ -104,7 +104,7 @@ std::vector<Figure> course_figures(const RunGroup& group, const RunReport& run) 
     spec.y.label = strip.label;
     const bool truth = strip.value == &CoursePoint::tumour_mm && has(&CoursePoint::true_tumour_mm);
     if (truth) {
-      spec.series.push_back(line("true", palette::kOrange, &CoursePoint::true_tumour_mm));
+      spec.series.push_back(line("true", meaning::kTrue, &CoursePoint::true_tumour_mm));
       spec.series.back().dash_px = 6.0;
     }
     spec.series.push_back(line(truth ? "estimated" : "", strip.colour, strip.value));
@@ -169,8 +169,8 @@ std::optional<Figure> recovery_figure(const std::vector<RunGroup>& groups,
       "100 (1 - mean error / mean without correction); craniotomy by closest-point projection "
       "distance";
   spec.y_label = "recovered (%)";
-  spec.series = {{"contact boundary", palette::kBlue, {}},
-                 {"fixed boundary", palette::kOrange, {}}};
+  spec.series = {{"contact boundary", meaning::kContact, {}},
+                 {"fixed boundary", meaning::kFixed, {}}};
   spec.reference_legend = "Ji et al. 2009 (simulated case)";
   spec.references.resize(2);
 

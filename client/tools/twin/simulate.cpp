@@ -105,7 +105,7 @@ Status simulate(const SimulateOptions& options, const Progress& progress) {
                    ": a truth that --truth gives has no ingredients");
   }
   if (std::filesystem::exists(options.out)) {
-    return fail(ErrorCode::kWriteFailed, options.out.string() + ": exists already");
+    return invalid(options.out.string() + ": exists already");
   }
   linalg::use_single_threaded_blas();  // before the first factorisation
   const auto patient = patient::read_patient(options.case_file, progress);

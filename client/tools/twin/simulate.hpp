@@ -42,8 +42,8 @@ Result<Points> read_truth_field(const std::filesystem::path& path, const BrainMo
 
 // The surgery file calls the scenario NAME, or NAME+INGREDIENT+... or NAME+all, or NAME+truth.
 // kNotFound for an unknown scenario or ingredient; the sentence lists the known ones.
-// kInvalidArgument when an ingredient does nothing (truth_load.hpp), or stands beside a truth.
-// kWriteFailed when `out` exists or cannot be written. Other errors: of reading the case, building
+// kInvalidArgument when an ingredient does nothing (truth_load.hpp), or stands beside a truth, or
+// `out` exists. kWriteFailed when it cannot be written. Other errors: of reading the case, building
 // its model, read_truth_field and play_scenario.
 Status simulate(const SimulateOptions& options, const Progress& progress = {});
 

@@ -116,13 +116,13 @@ Result<CaseConfig> parse_case(const std::string& text, const fs::path& file, boo
 // Puts what the files of a case hold into their places.
 class Loader {
  public:
-  explicit Loader(const CaseConfig& config) : config_(config) {}
+  // go_on: after the first error too.
+  Loader(const CaseConfig& config, bool go_on) : config_(config), go_on_(go_on) {}
 
-  // Puts what `read` makes of the file into its place. An error names the key. Nothing happens
-  // after the first error.
+  // Puts what `read` makes of the file into its place. The first error stays; it names the key.
   template <typename Read, typename T>
   void load(const fs::path& member, const Read& read, std::optional<T>& place) {
-    if (!status_) return;
+    if (!status_ && !go_on_) return;
     auto result = read(member);
     if (result) {
       place = std::move(*result);
@@ -131,18 +131,48 @@ class Loader {
     }
   }
   void look_up(const fs::path& member) {
-    if (member.empty() || !status_) return;
+    if (member.empty() || (!status_ && !go_on_)) return;
     if (Status found = check_regular_file(member); !found) blame(member, found.error());
   }
   const Status& status() const { return status_; }
 
  private:
   void blame(const fs::path& member, const Error& error) {
-    status_ = fail(error.code, key_of(config_, member) + ": " + error.message);
+    if (status_) status_ = fail(error.code, key_of(config_, member) + ": " + error.message);
   }
   const CaseConfig& config_;
+  bool go_on_;
   Status status_;
 };
+
+ReadableInputs load(const CaseConfig& config, bool go_on) {
+  CaseInputs inputs;
+  inputs.config = config;
+  Loader loader(config, go_on);
+  loader.look_up(config.mri);
+  if (const auto* file = std::get_if<MeshFile>(&config.mesh)) {
+    loader.load(file->path, read_tet_mesh, inputs.mesh);
+  } else {
+    loader.load(config.brain, read_volume, inputs.brain);
+  }
+  if (const auto* label = std::get_if<TumourLabel>(&config.tumour)) {
+    const LabelChoice choice{label->segment.value_or(""), label->labels.front()};
+    const auto read = [&](const fs::path& path) { return read_label_map(path, choice); };
+    loader.load(label->path, read, inputs.tumour_labels);
+  } else if (const auto* surface = std::get_if<TumourSurfaceFile>(&config.tumour)) {
+    loader.load(surface->path, read_surface, inputs.tumour_surface);
+  }
+  if (config.contact.skull_file) {
+    loader.load(*config.contact.skull_file, read_surface, inputs.skull);
+  }
+  if (config.anatomy.labels) {
+    loader.load(*config.anatomy.labels, read_volume, inputs.labels);
+    std::optional<LabelNames> names;
+    loader.load(*config.anatomy.labels, label_names_beside, names);
+    if (names) inputs.label_names = std::move(*names);
+  }
+  return {std::move(inputs), loader.status()};
+}
 
 }  // namespace
 
@@ -178,33 +208,11 @@ std::string case_config_text(const CaseConfig& config) {
 }
 
 Result<CaseInputs> load_case_inputs(const CaseConfig& config) {
-  CaseInputs inputs;
-  inputs.config = config;
-  Loader loader(config);
-  loader.look_up(config.mri);
-  if (const auto* file = std::get_if<MeshFile>(&config.mesh)) {
-    loader.load(file->path, read_tet_mesh, inputs.mesh);
-  } else {
-    loader.load(config.brain, read_volume, inputs.brain);
-  }
-  if (const auto* label = std::get_if<TumourLabel>(&config.tumour)) {
-    const LabelChoice choice{label->segment.value_or(""), label->labels.front()};
-    const auto read = [&](const fs::path& path) { return read_label_map(path, choice); };
-    loader.load(label->path, read, inputs.tumour_labels);
-  } else if (const auto* surface = std::get_if<TumourSurfaceFile>(&config.tumour)) {
-    loader.load(surface->path, read_surface, inputs.tumour_surface);
-  }
-  if (config.contact.skull_file) {
-    loader.load(*config.contact.skull_file, read_surface, inputs.skull);
-  }
-  if (config.anatomy.labels) {
-    loader.load(*config.anatomy.labels, read_volume, inputs.labels);
-    std::optional<LabelNames> names;
-    loader.load(*config.anatomy.labels, label_names_beside, names);
-    if (names) inputs.label_names = std::move(*names);
-  }
-  if (!loader.status()) return tl::unexpected(loader.status().error());
-  return inputs;
+  ReadableInputs read = load(config, false);
+  if (!read.status) return tl::unexpected(read.status.error());
+  return std::move(read.inputs);
 }
+
+ReadableInputs load_readable_inputs(const CaseConfig& config) { return load(config, true); }
 
 }  // namespace brainshift::io

@@ -36,4 +36,11 @@ std::string case_config_text(const CaseConfig& config);
 // kNotFound, kUnreadable: the message names key and file.
 Result<CaseInputs> load_case_inputs(const CaseConfig& config);
 
+// Those of the files that can be read, and the first error of those that cannot.
+struct ReadableInputs {
+  CaseInputs inputs;
+  Status status;
+};
+ReadableInputs load_readable_inputs(const CaseConfig& config);
+
 }  // namespace brainshift::io

@@ -267,14 +267,41 @@ Result<DicomSeries> join(std::vector<Slice>& slices) {
   return series;
 }
 
+// Of folders, and of those in them, which hold DICOM files (among their first); "" without any.
+std::string below_with_dicom(std::vector<fs::path> folders) {
+  constexpr std::size_t kMost = 5, kMostFolders = 1000, kMostFiles = 20;
+  std::vector<std::string> found;
+  const std::size_t top = folders.size();
+  for (std::size_t f = 0; f < folders.size() && folders.size() < kMostFolders; ++f) {
+    std::size_t looked = 0;
+    bool holds = false;
+    std::error_code denied;
+    for (const auto& entry : fs::directory_iterator(folders[f], denied)) {
+      if (f < top && entry.is_directory()) folders.push_back(entry.path());
+      if (holds || looked >= kMostFiles || !entry.is_regular_file()) continue;
+      ++looked;
+      holds = is_dicom(entry.path());
+    }
+    if (holds) found.push_back(in_quotes(folders[f].string()));
+  }
+  if (found.empty()) return {};
+  std::sort(found.begin(), found.end());
+  const std::size_t shown = std::min(found.size(), kMost);
+  std::string text = "; folders below do, give one of them: ";
+  for (std::size_t i = 0; i < shown; ++i) text += (i == 0 ? "" : ", ") + found[i];
+  return shown < found.size() ? text + fmt::format(" and {} more", found.size() - shown) : text;
+}
+
 }  // namespace
 
 Result<DicomSeries> read_dicom_series(const fs::path& folder) {
   if (!fs::is_directory(folder)) return file_error(ErrorCode::kNotFound, folder, "is no folder");
   prepare_dcmtk();
   std::vector<fs::path> files;
+  std::vector<fs::path> folders;
   for (const auto& entry : fs::directory_iterator(folder)) {
     if (entry.is_regular_file()) files.push_back(entry.path());
+    if (entry.is_directory()) folders.push_back(entry.path());
   }
   std::sort(files.begin(), files.end());
   std::vector<Slice> slices;
@@ -293,7 +320,8 @@ Result<DicomSeries> read_dicom_series(const fs::path& folder) {
     }
   }
   if (slices.empty()) {
-    return unreadable(folder, fmt::format("holds no DICOM image ({} files)", files.size()));
+    return unreadable(folder, fmt::format("holds no DICOM image ({} files){}", files.size(),
+                                          below_with_dicom(std::move(folders))));
   }
   auto series = join(slices);
   if (!series) return file_error(folder, series.error());

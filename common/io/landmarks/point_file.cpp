@@ -176,9 +176,10 @@ Result<NamedPoints> parse_points(const std::string& content) {
     const std::size_t most = table.heading ? table.heading->size() : expected;
     if (!point || row.cells.size() > most || row.cells.size() < expected) {
       return bad_line(row.line, row.text,
-                      expected == 4
-                          ? "must have three finite numbers behind a name, as the rows above"
-                          : "must have three finite numbers, and no more cells than the heading");
+                      table.heading ? "must have three finite numbers, and no more cells than the "
+                                      "heading"
+                      : expected == 4 ? "must have three finite numbers behind a name"
+                                      : "must have three finite numbers and nothing else");
     }
     named.add(name && *name < row.cells.size() ? row.cells[*name] : std::string(), *point);
   }

@@ -342,4 +342,19 @@ Result<std::optional<CondensedOperators>> read_operators(const fs::path& path,
   });
 }
 
+Result<std::optional<OldModel>> model_to_replace(const fs::path& path) {
+  std::error_code error;
+  if (!fs::exists(path, error)) return std::nullopt;
+  std::ifstream in(path, std::ios::binary);
+  std::string magic(kMagic.size(), '\0');
+  in.read(magic.data(), static_cast<std::streamsize>(magic.size()));
+  if (!in || magic != kMagic) {
+    return invalid_file(path, "is there and is no model file: it is not replaced");
+  }
+  const auto read = read_file<OldModel>(path, [](const Hdf5Reader& file) {
+    return OldModel{file.attribute_text("/", "case_id"), file.attribute_text("/", "model_id"), {}};
+  });
+  return read ? *read : OldModel{{}, {}, read.error().message};
+}
+
 }  // namespace brainshift::io

@@ -54,6 +54,7 @@
 
 #include <filesystem>
 #include <optional>
+#include <string>
 #include <vector>
 
 #include "common/configuration/case_config.hpp"
@@ -87,5 +88,14 @@ Result<ModelFile> read_model(const std::filesystem::path& path,
 Result<std::optional<CondensedOperators>> read_operators(const std::filesystem::path& path,
                                                          const BrainModel& model,
                                                          Boundary boundary);
+
+// What a model written to a path would replace.
+struct OldModel {
+  std::string case_id, model_id;  // empty where `unreadable` is not
+  std::string unreadable;         // why it cannot be read: damaged, or of another format
+};
+// Nothing where no file is. kInvalidArgument: a file that does not begin as model files do; it is
+// somebody else's, and no model is to be written in its place.
+Result<std::optional<OldModel>> model_to_replace(const std::filesystem::path& path);
 
 }  // namespace brainshift::io

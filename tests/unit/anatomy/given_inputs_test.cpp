@@ -106,6 +106,26 @@ TEST(BrainMask, ANormalisedImageIsNoMask) {
                     HasSubstr("normalised image")));
 }
 
+TEST(Notes, SayWhetherThereIsSomethingToDo) {
+  EXPECT_EQ(what_to_do(0.1, "falx"), "; nothing to do");
+  EXPECT_EQ(what_to_do(0.11, "falx"),
+            "; look at the falx in the pictures, and at the labels there");
+  EXPECT_TRUE(asks_nothing("falx of 72 cm2" + what_to_do(0.0, "falx")));
+  EXPECT_FALSE(asks_nothing("falx of 72 cm2" + what_to_do(0.2, "falx")));
+}
+
+TEST(BrainMask, AnImageOfTheWholeHeadIsNoBrain) {
+  VoxelImage head = balls({{Vec3::Zero(), 20.0}});
+  head.T_ras_voxel.linear() *= 4.3;  // 2,664 cc
+  EXPECT_GT(sum(value_or_fail(brain_mask(head, "m", nullptr))), 0.0) << "a mask may be as large";
+  int n = 0;
+  for (float& v : head.values) v *= static_cast<float>(1 + n++ % 200);
+  EXPECT_THAT(refused(brain_mask(head, "m", nullptr)),
+              AllOf(HasSubstr("m: is an image of the whole head, not a brain"), HasSubstr("cc")));
+  head.T_ras_voxel.linear() *= 0.95;
+  EXPECT_GT(sum(value_or_fail(brain_mask(head, "m", nullptr))), 0.0);
+}
+
 TEST(BrainMask, RipplesAreNoBrain) {
   const VoxelImage ball = balls({{Vec3::Zero(), 20.0}});
   VoxelImage image = ball;

@@ -203,6 +203,10 @@ TEST(Regions, MapsThatCannotGiveWhatIsAskedForAreNamed) {
   EXPECT_THAT(refusal(image), HasSubstr("is no label map: it has the value 0.25"));
   image.label_names = {{2, "Left-Cerebral-White-Matter"}};  // whose numbers round the values
   EXPECT_THAT(refusal(image), HasSubstr("is no label map: it has the value 0.25"));
+  CaseInputs mri = labelled_case();
+  int n = 0;
+  for (float& v : mri.labels->values) v = static_cast<float>(n++ % 997);
+  EXPECT_THAT(refusal(mri), HasSubstr("anatomy.labels = 'labels.nii': is an image, not a label"));
   CaseInputs ready = labelled_case();
   ready.config.mesh = MeshFile{"head.msh"};
   EXPECT_THAT(refusal(ready), HasSubstr("anatomy.labels: needs a mesh that is generated"));
@@ -282,8 +286,10 @@ TEST(Regions, LabelsThatNobodyKnowsAreToldWithTheirSizesAndTheFile) {
                   HasSubstr("anatomy.labels = 'labels.nii': not of the brain by anatomy.numbers = "
                             "freesurfer: 507 ("),
                   HasSubstr(" cc); where the brain is"))));
-  for (const std::string& note : shared_head().notes)
+  for (const std::string& note : shared_head().notes) {
     EXPECT_THAT(note, ::testing::Not(HasSubstr("not of the brain")));
+    EXPECT_TRUE(asks_nothing(note)) << note;
+  }
 }
 
 // A horn as wide as the ventricle, to the surface: a cavity must not open it.
@@ -299,9 +305,9 @@ TEST(Regions, VentriclesThatTouchTheSurfaceStayBrainThereAndAreTold) {
       }
   const LabelledHead head = head_of(inputs);
   EXPECT_THAT(head.notes,
-              ::testing::Contains(::testing::AllOf(HasSubstr("anatomy.labels = 'labels.nii': of "),
+              ::testing::Contains(::testing::AllOf(HasSubstr("anatomy.labels: of "),
                                                    HasSubstr(" cc touch the brain's surface and "),
-                                                   HasSubstr("they are brain"))));
+                                                   HasSubstr("they are brain; nothing to do"))));
   EXPECT_TRUE(geometry::is_closed({head.model.mesh.nodes, head.model.ventricle_wall}));
   EXPECT_NEAR(geometry::enclosed_volume({head.model.mesh.nodes, head.model.boundary_triangles}),
               geometry::balls::ball_volume(kBallRadius_mm),

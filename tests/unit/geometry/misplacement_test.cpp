@@ -28,5 +28,15 @@ TEST(Misplacement, PointsThatAreNoneAreNoMistake) {
   EXPECT_EQ(likely_mistake(Points::Constant(3, 1, std::nan("")), always), "");
 }
 
+TEST(Misplacement, APlaceInMetresIsNearTheOriginAndMeantInTheHead) {
+  const auto in_head = [](const Vec3& x) { return x.norm() < 100.0; };
+  EXPECT_EQ(metres_for_millimetres(Vec3(0.046, -0.047, 0.009), in_head),
+            "lies within 0.1 mm of the origin; in metres it would be (46.0, -47.0, 9.0) mm");
+  EXPECT_EQ(metres_for_millimetres(Vec3(0.2, 0.0, 0.0), in_head), "") << "200 mm is no head";
+  EXPECT_EQ(metres_for_millimetres(Vec3::Zero(), in_head), "");
+  const auto anywhere = [](const Vec3&) { return true; };
+  EXPECT_EQ(metres_for_millimetres(Vec3(1, -2, 0), anywhere), "");
+}
+
 }  // namespace
 }  // namespace brainshift::geometry

@@ -52,6 +52,16 @@ TEST_F(CaseInputsFile, NamedFilesAreReadAndOthersAreNot) {
   EXPECT_FALSE(inputs.tumour_labels);
 }
 
+TEST_F(CaseInputsFile, WhatCanBeReadIsReadBesideWhatCannot) {
+  config_.mri = folder_ / "no_t1.nii";
+  config_.tumour = TumourSurfaceFile{folder_ / "no_s.stl"};
+  const ReadableInputs read = load_readable_inputs(config_);
+  EXPECT_THAT(sentence_of(read.status), StartsWith("images.mri: "));
+  EXPECT_TRUE(read.inputs.mesh);
+  EXPECT_FALSE(read.inputs.tumour_surface);
+  EXPECT_TRUE(read.inputs.skull);
+}
+
 TEST_F(CaseInputsFile, ASegmentOfASegmentationIsTheTumour) {
   const auto file = folder_.write(
       "t.seg.nrrd",

@@ -21,6 +21,7 @@ using test_support::put;
 using test_support::TemporaryFolder;
 using testing::AllOf;
 using testing::ElementsAre;
+using testing::EndsWith;
 using testing::HasSubstr;
 
 // Sagittal images of 3 columns and 2 rows: rows run from the nose to the back, columns downwards.
@@ -158,6 +159,13 @@ TEST_F(DicomSeriesOf, AWrongTagIsNamedWithItsFile) {
 TEST_F(DicomSeriesOf, AFolderWithoutImagesIsRefused) {
   const TemporaryFolder empty;
   EXPECT_THAT(refusal_of(read_dicom_series(empty.path())), HasSubstr("no DICOM image (0 files)"));
+  std::filesystem::create_directories(empty / "CT");
+  std::filesystem::create_directories(empty / "study/T1");
+  EXPECT_THAT(refusal_of(read_dicom_series(empty.path())), EndsWith("no DICOM image (0 files)"));
+  empty.write("study/T1/1.dcm", Image("-24").bytes());
+  EXPECT_THAT(refusal_of(read_dicom_series(empty.path())),
+              EndsWith("no DICOM image (0 files); folders below do, give one of them: \"" +
+                       (empty / "study/T1").string() + "\""));
   EXPECT_THAT(refusal_of(read_dicom_series(empty / "nowhere"), ErrorCode::kNotFound),
               HasSubstr("nowhere"));
 }

@@ -163,7 +163,12 @@ TEST(PointFile, RefusesTablesOfAnotherShape) {
                                            {"# u,v,w\n1,2,3\n", "line 1: \"u,v,w\" must be"},
                                            {"x_m,y_m,z_m\n1,2,3\n", "a heading with the columns"},
                                            {"x,y,z\n1,2,3,4\n", "no more cells"},
-                                           {"1,2,3\n4,5\n", "line 2: \"4,5\""},
+                                           {"1,2,3\n4,5\n",
+                                            "line 2: \"4,5\" must have three "
+                                            "finite numbers and nothing else"},
+                                           {"a,b,1,2\n",
+                                            "line 1: \"a,b,1,2\" must have three "
+                                            "finite numbers behind a name"},
                                            {"a,1,2,3\n1,2,3\n", "behind a name"},
                                            {"x,y,z\n1,2,inf\n", "line 2"}});
   expect_refused(reading_points("a.csv"), {{"x,y,z\n", "no point"}, {"", "no point"}},

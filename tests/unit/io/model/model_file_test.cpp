@@ -118,6 +118,24 @@ TEST_F(ModelFileTest, OnlyTheFinalFileIsLeftAndAnOldOneIsReplaced) {
   EXPECT_EQ(folder_.entries(), 1u);
 }
 
+TEST_F(ModelFileTest, WhatWouldBeReplacedIsAModelOrRefused) {
+  EXPECT_FALSE(value_or_fail(model_to_replace(folder_ / "absent.h5")));
+  const auto old = value_or_fail(model_to_replace(written()));
+  ASSERT_TRUE(old);
+  EXPECT_EQ(old->case_id, condensed_file().model.case_id);
+  EXPECT_EQ(old->model_id, condensed_file().model.model_id);
+  EXPECT_EQ(old->unreadable, "");
+  std::string altered = content_of(written());
+  altered[altered.size() / 2] = static_cast<char>(altered[altered.size() / 2] ^ 1);
+  EXPECT_THAT(value_or_fail(model_to_replace(folder_.write("a.h5", altered)))->unreadable,
+              HasSubstr("a.h5: is altered or damaged"));
+  for (const char* content : {"", "my notes", "brainshift model", "\x89HDF\r\n\x1a\n"}) {
+    EXPECT_THAT(
+        refusal_of(model_to_replace(folder_.write("n.h5", content)), ErrorCode::kInvalidArgument),
+        HasSubstr("n.h5: is there and is no model file: it is not replaced"));
+  }
+}
+
 TEST_F(ModelFileTest, EveryFlippedBitIsRefused) {
   const auto path = written();
   const std::string intact = content_of(path);

@@ -3,8 +3,10 @@
 
 #include <gmock/gmock.h>
 
+#include "common/io/model/model_file.hpp"
 #include "server/main/progress_bar.hpp"
 #include "tests/support/results.hpp"
+#include "tests/support/temporary_folder.hpp"
 
 namespace brainshift::server {
 namespace {
@@ -22,6 +24,27 @@ TEST(PrintError, IsOneLine) {
   testing::internal::CaptureStderr();
   EXPECT_EQ(print_error({ErrorCode::kNotFound, "a\nb"}), 2);
   EXPECT_EQ(testing::internal::GetCapturedStderr(), "brainshiftd: a b\n");
+}
+
+TEST(Prepare, LeavesAFileAloneThatIsNoModel) {
+  const test_support::TemporaryFolder folder;
+  const auto mine = folder.write("notes.txt", "my notes");
+  testing::internal::CaptureStderr();
+  EXPECT_EQ(run_prepare({folder / "any.yaml", mine, true}), 2);
+  EXPECT_THAT(testing::internal::GetCapturedStderr(),
+              testing::EndsWith("notes.txt: is there and is no model file: it is not replaced\n"));
+  EXPECT_EQ(test_support::content_of(mine), "my notes");
+}
+
+TEST(Prepare, TellsWhichModelItReplacesAndWhetherItIsTheSame) {
+  BrainModel made;
+  made.model_id = "abcd";
+  EXPECT_EQ(replacement_text("m.h5", {"head", "abcd", ""}, made),
+            "m.h5: replaces the model of case head, abcd: the new one is the same");
+  EXPECT_EQ(replacement_text("m.h5", {"head", "0123", ""}, made),
+            "m.h5: replaces the model of case head, 0123: the new one is another, abcd");
+  EXPECT_EQ(replacement_text("m.h5", {"", "", "m.h5: is damaged"}, made),
+            "m.h5: replaces a model that cannot be read: m.h5: is damaged");
 }
 
 std::string progress_lines(ProgressBar::Style style) {

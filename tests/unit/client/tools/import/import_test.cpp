@@ -344,7 +344,7 @@ TEST_F(Import, WhenEveryContourIsLostItSaysWhy) {
 
 TEST_F(Import, NeverOverwritesASurgery) {
   std::ofstream(options.out) << "kept";
-  refusal_of(import_recording(options), ErrorCode::kWriteFailed);
+  refusal_of(import_recording(options), ErrorCode::kInvalidArgument);
   EXPECT_EQ(test_support::content_of(options.out), "kept");
 }
 

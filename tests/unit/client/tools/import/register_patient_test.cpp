@@ -269,6 +269,9 @@ TEST_F(RegisterPatient, ATargetOutsideOfTheHeadIsRefused) {
   EXPECT_THAT(refusal(), AllOf(HasSubstr("--target (46.0, -47.0, 900.0) lies "),
                                HasSubstr("from the middle of the fiducials in the image"),
                                HasSubstr("must lie within 300 mm")));
+  options.target = Vec3(0.046, -0.047, 0.009);
+  EXPECT_THAT(refusal(), HasSubstr("--target (0.046, -0.047, 0.009) lies within 0.1 mm of the "
+                                   "origin; in metres it would be (46.0, -47.0, 9.0) mm"));
 }
 
 TEST_F(RegisterPatient, PosesThatTheTrackerLostAreLeftOut) {
@@ -351,7 +354,7 @@ TEST_F(RegisterPatient, NamesWhatIsMissingOrTooMuch) {
 
 TEST_F(RegisterPatient, AnExistingFileIsLeftAlone) {
   folder.write("T_ras_reference.txt", "mine");
-  EXPECT_THAT(refusal_of(register_patient(options), ErrorCode::kWriteFailed),
+  EXPECT_THAT(refusal_of(register_patient(options), ErrorCode::kInvalidArgument),
               HasSubstr("exists already"));
 }
 

@@ -251,11 +251,16 @@ TEST_F(RegisterUltrasound, NamesWhatIsMissingOrWrong) {
   std::fill(other.values.begin(), other.values.end(), 0.0F);
   other.values.front() = 1.0F;
   put("other.nii.gz", other);
-  EXPECT_THAT(with([&](O& o) { o.brain = folder / "other.nii.gz"; }),
+  const Vec3 its_voxel = other.T_ras_voxel.translation();
+  EXPECT_THAT(with([&](O& o) { o.brain = folder / "other.nii.gz", o.target = its_voxel; }),
               AllOf(HasSubstr("0 % of the samples lie inside the brain: at least"),
                     HasSubstr("and --brain " + (folder / "other.nii.gz").string())));
-  EXPECT_THAT(with([](O& o) { o.target = Vec3(6, -4, 500); }),
-              HasSubstr("--target (6.0, -4.0, 500.0) lies 500 mm from the middle of the brain in"));
+  EXPECT_THAT(
+      with([](O& o) { o.target = Vec3(6, -4, 100); }),
+      AllOf(HasSubstr("--target (6.0, -4.0, 100.0) lies 6"), HasSubstr("mm from the brain in"),
+            HasSubstr("which reaches from ("), HasSubstr("must lie within 30 mm")));
+  EXPECT_THAT(with([](O& o) { o.target = Vec3(0.006, -0.004, 0.005); }),
+              HasSubstr("in metres it would be (6.0, -4.0, 5.0) mm"));
   SequenceContent content = VirtualProbe().content();
   for (auto& frame : content.frames) frame["ProbeToTrackerTransformStatus"] = "INVALID";
   record(content);
@@ -265,7 +270,7 @@ TEST_F(RegisterUltrasound, NamesWhatIsMissingOrWrong) {
 
 TEST_F(RegisterUltrasound, WhatIsThereIsLeftAlone) {
   folder.write("second.png", "mine");
-  EXPECT_THAT(refusal_of(register_ultrasound(options), ErrorCode::kWriteFailed),
+  EXPECT_THAT(refusal_of(register_ultrasound(options), ErrorCode::kInvalidArgument),
               AllOf(HasSubstr("second.png"), HasSubstr("exists already")));
   EXPECT_FALSE(fs::exists(options.out));
   EXPECT_EQ(test_support::content_of(folder / "second.png"), "mine");

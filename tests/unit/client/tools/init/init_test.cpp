@@ -21,6 +21,7 @@ namespace {
 
 using test_support::TemporaryFolder;
 using testing::AllOf;
+using testing::Contains;
 using testing::ElementsAre;
 using testing::HasSubstr;
 using testing::IsEmpty;
@@ -96,6 +97,27 @@ TEST_F(FirstCase, FromLabelsCanBePreparedAndSaysWhereEachGuessComesFrom) {
   EXPECT_THAT(view.problems, IsEmpty());
 }
 
+TEST_F(FirstCase, WhoseLabelsOrTumourDoNotServeIsSeenAllTheSame) {
+  value_or_fail(write_first_case(options));
+  const auto append = [this](const std::string& name, const std::string& more) {
+    return folder.write(name, test_support::content_of(options.out) + more);
+  };
+  put("moved.nii", drawn([](const Vec3& x) { return label_at(x - Vec3(0, 30, 0)); }));
+  const CaseView moved =
+      value_or_fail(view_case(append("moved.yaml", "anatomy: {labels: moved.nii, septa: off}\n")));
+  EXPECT_THAT(moved.problems, ElementsAre(HasSubstr("outside the mask of")));
+  ASSERT_TRUE(moved.label_voxels);
+  EXPECT_GT(moved.brain.num_vertices(), 0);
+  EXPECT_GT(moved.tumour.num_vertices(), 0);
+  put("tumour.nii", drawn([](const Vec3& x) {
+        return lesion_at(x) > 0.0F && std::abs(x.z() - 30.0) < 1.5 ? 1.0F : 0.0F;
+      }));
+  const CaseView thin = value_or_fail(
+      view_case(append("thin.yaml", "mesh: {generate: {edge_mm: 9, tumour_edge_mm: 5}}\n")));
+  EXPECT_THAT(thin.problems, ElementsAre(HasSubstr("no voxel has this label")));
+  EXPECT_GT(thin.brain.num_vertices(), 0) << "without a tumour to be fine about";
+}
+
 TEST_F(FirstCase, FromAMaskTakesTheLowestPartNearTheMiddle) {
   options.labels.clear();
   options.brain = folder / "brain.nii";
@@ -140,6 +162,22 @@ TEST_F(FirstCase, TheBackgroundIsNoTumour) {
   EXPECT_THAT(refusal(), HasSubstr("is no label map: it has the value 1e+30"));
 }
 
+TEST_F(FirstCase, ATumourOutsideTheBrainIsRefusedAndOneThatSticksOutIsDoubted) {
+  const auto ball_at = [this](const Vec3& centre) {
+    put("tumour.nii",
+        drawn([&](const Vec3& x) { return (x - centre).norm() < 12.0 ? 1.0F : 0.0F; }));
+  };
+  ball_at(Vec3(85, 0, 0));  // the brain ends at 70
+  EXPECT_THAT(refusal(),
+              AllOf(HasSubstr("--tumour: "), HasSubstr("tumour.nii: 100 % of the tumour "
+                                                       "lie outside the brain, up to 2")));
+  EXPECT_FALSE(std::filesystem::exists(options.out));
+  ball_at(Vec3(66, 0, 0));
+  EXPECT_THAT(value_or_fail(write_first_case(options)).guesses,
+              Contains(AllOf(HasSubstr("tumour: "), HasSubstr("LOOK AGAIN"),
+                             HasSubstr("more than 3 mm are not prepared"))));
+}
+
 TEST_F(FirstCase, AVolumeThatIsThereIsNeverReplacedAndNothingIsLeftBehind) {
   const std::string mine = "my own mask";
   std::ofstream(folder / "case-brain.nii.gz") << mine;
@@ -178,6 +216,24 @@ TEST_F(FirstCase, LabelsThatAreNoWholeNumbersAreRefused) {
 }
 
 // Ventricles that are as bright as white matter, because the map lies 30 mm beside the MRI.
+TEST_F(FirstCase, AnMriIsNeitherLabelMapNorBrain) {
+  // A head of 3,400 cc with the grey values of tissue.
+  put("t1.nii", drawn([](const Vec3& x) {
+        const double r = x.cwiseQuotient(Vec3(85, 100, 95)).norm();
+        return r < 1.0 ? 100.0F + std::floor(400.0F * static_cast<float>(r)) : 0.0F;
+      }));
+  options.labels = folder / "t1.nii";
+  EXPECT_THAT(refusal(), AllOf(HasSubstr("--labels: "), HasSubstr("t1.nii: is an image, not a "),
+                               HasSubstr("more than 60 different values")));
+  folder.write("t1.tsv", "index\tname\n200\tBrain-Stem\n");
+  EXPECT_THAT(refusal(), HasSubstr("is an image, not a label map"));
+  options.labels.clear();
+  options.brain = folder / "t1.nii";
+  EXPECT_THAT(refusal(), AllOf(HasSubstr("--brain: "), HasSubstr("t1.nii: is an image of the "),
+                               HasSubstr("not a brain: 33")));
+  EXPECT_FALSE(std::filesystem::exists(options.out));
+}
+
 TEST_F(FirstCase, ALabelMapThatDoesNotLieOnTheMriIsDoubted) {
   const auto ventricle = [](const Vec3& x) { return (x - Vec3(10, 0, 10)).norm() < 20.0; };
   const auto map = drawn([&](const Vec3& x) { return ventricle(x) ? 43.0F : label_at(x); });

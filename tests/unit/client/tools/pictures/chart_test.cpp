@@ -55,6 +55,23 @@ TEST(Chart, TheCursorOverAColumnShowsItsValues) {
   EXPECT_THAT(svg, HasSubstr("<title>iteration: 1\nsparse: 1.25 ± 0.5\nius, &lt;good&gt;</title>"));
 }
 
+TEST(Chart, TheUprightLabelStaysBesideTheDataAndOffTheLegend) {
+  ChartSpec spec = one_line({3.0, 1.25});
+  spec.y.label = "motion of the tumour (mm)";
+  spec.size = {900, 230};
+  const std::string svg = draw_chart(spec);
+  const std::regex label(
+      "y=\"([0-9.]+)\" text-anchor=\"middle\" fill=\"[^\"]*\" transform=[^>]*>"
+      "([^<]*)<");
+  std::string words;
+  for (std::sregex_iterator at(svg.begin(), svg.end(), label), end; at != end; ++at) {
+    const double half = 0.5 * 6.6 * static_cast<double>((*at)[2].length());
+    EXPECT_GT(std::stod((*at)[1]) - half, 50.0) << "title and legend end there";
+    words += (*at)[2].str() + "|";
+  }
+  EXPECT_EQ(words, "motion of the|tumour (mm)|");
+}
+
 TEST(Chart, LargerValuesStandHigherAndFartherRight) {
   const auto at = circles(draw_chart(one_line({0.0, 5.0})));
   ASSERT_EQ(at.size(), 2u);

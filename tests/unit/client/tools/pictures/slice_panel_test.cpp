@@ -63,6 +63,48 @@ TEST(Section, OfAClosedSurfaceIsOneClosedLineOfTheRightLength) {
   EXPECT_TRUE(section_polylines(sphere, Vec3::UnitZ(), 30.0).empty());
 }
 
+// Both sides of a strip in the plane x = 5, as of falx and tentorium.
+TriangleSurface sheet_of_two_sides() {
+  TriangleSurface sheet;
+  constexpr int kSteps = 4;
+  sheet.vertices.resize(3, 4 * (kSteps + 1));
+  sheet.triangles.resize(3, 4 * kSteps);
+  int t = 0;
+  for (int side = 0; side < 2; ++side) {
+    const int first = 2 * (kSteps + 1) * side;
+    for (int i = 0; i <= kSteps; ++i) {
+      sheet.vertices.col(first + 2 * i) = Vec3(5.0, 2.0 * i, 0.0);
+      sheet.vertices.col(first + 2 * i + 1) = Vec3(5.0, 2.0 * i, 10.0);
+      if (i == kSteps) break;
+      const int a = first + 2 * i;
+      sheet.triangles.col(t++) = Eigen::Vector3i(a, a + 1 + side, a + 2 - side);
+      sheet.triangles.col(t++) = Eigen::Vector3i(a + 1, a + 3 - side, a + 2 + side);
+    }
+  }
+  return sheet;
+}
+
+TEST(Section, OfASheetWithTwoSidesIsOneLine) {
+  const auto lines = section_polylines(sheet_of_two_sides(), Vec3::UnitZ(), 5.0);
+  ASSERT_EQ(lines.size(), 1u);
+  EXPECT_NEAR((lines[0].front() - lines[0].back()).norm(), 8.0, 1e-9);
+}
+
+TEST(SlicePanel, SaysWhetherASectionLiesInThePictureAndDrawsItWithoutABreak) {
+  SlicePanel panel(kWindow);
+  EXPECT_TRUE(panel.draw_section(sheet_of_two_sides(), {palette::kGreen, 5, 0.0, 2}));
+  const cv::Point2d from = kWindow.pixel({5, 0.5, 5}), to = kWindow.pixel({5, 7.5, 5});
+  for (int y = static_cast<int>(to.y); y < static_cast<int>(from.y); ++y) {
+    EXPECT_EQ(panel.image().at<cv::Vec3b>(y, static_cast<int>(from.x)), cv::Vec3b(115, 158, 0));
+  }
+  SliceWindow elsewhere = kWindow;
+  elsewhere.across_min = 6.0;
+  EXPECT_FALSE(SlicePanel(elsewhere).draw_section(sheet_of_two_sides(), {}));
+  elsewhere = kWindow;
+  elsewhere.offset_mm = 11.0;
+  EXPECT_FALSE(SlicePanel(elsewhere).draw_section(sheet_of_two_sides(), {}));
+}
+
 TEST(Section, OfTheDeformedSurfaceMovesWithALinearField) {
   const TetMesh mesh = box_mesh();
   const geometry::TetLocator locator(mesh);

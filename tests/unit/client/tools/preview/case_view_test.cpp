@@ -99,6 +99,22 @@ TEST_F(CaseViewOf, DoubtsSayHowFarACentreIsProjectedAndKnowCentimetres) {
       Contains(AllOf(HasSubstr("mm from the brain's surface"), Not(HasSubstr("centimetres?")))));
 }
 
+TEST_F(CaseViewOf, NotesThatAskNothingAreFactsAndOthersDoubts) {
+  CaseView seen = view();
+  seen.notes = {"falx of 70 cm2; nothing to do", "falx of 7 cm2; look at the falx"};
+  EXPECT_THAT(facts(seen), AllOf(Contains(seen.notes[0]), Not(Contains(seen.notes[1]))));
+  EXPECT_THAT(doubts(seen), AllOf(Contains(seen.notes[1]), Not(Contains(seen.notes[0]))));
+}
+
+TEST_F(CaseViewOf, DoubtsNameAMaskThatHasLeaked) {
+  CaseView seen = view();
+  seen.leak_mm3 = 4900.0, seen.leak_centre = Vec3(20, 84, -10);
+  EXPECT_THAT(doubts(seen), Not(Contains(HasSubstr("did the mask leak"))));
+  seen.leak_mm3 = 13100.0;
+  EXPECT_THAT(doubts(seen), Contains(AllOf(HasSubstr("13 cc of images.brain hang on the rest"),
+                                           HasSubstr("right 20, anterior 84, inferior 10 mm"))));
+}
+
 // An MRI that is bright in the box, grey around it and black far away.
 VoxelImage head_with_a_brain(const Vec3& centre) {
   VoxelImage mri;

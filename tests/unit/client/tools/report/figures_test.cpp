@@ -12,6 +12,7 @@
 namespace brainshift::client {
 namespace {
 
+using testing::ContainsRegex;
 using testing::HasSubstr;
 
 TEST(Figures, OfAGroupShowEveryPictureThatItsDataAllow) {
@@ -72,7 +73,13 @@ TEST(Figures, OfACourseAreAStripPerQuantityThatItHasWithTheTruthWhereRecorded) {
   EXPECT_THAT(strips[0].svg, HasSubstr("2.5 ± 0.25\nius, caution: why &lt;so&gt;"));
   EXPECT_THAT(strips[1].svg, HasSubstr("time of the update (ms): 80"));
   for (CoursePoint& point : run.course) point.true_tumour_mm = 2.6;
-  EXPECT_THAT(course_figures(group, run)[0].svg, HasSubstr("true: 2.6"));
+  strips = course_figures(group, run);
+  EXPECT_THAT(strips[0].svg, HasSubstr("true: 2.6"));
+  // The colours of the outlines in the slices.
+  EXPECT_THAT(strips[0].svg,
+              ContainsRegex("stroke=\"#56b4e9\"[^>]*>\n<circle[^>]*>\n<text[^>]*>true<"));
+  EXPECT_THAT(strips[0].svg,
+              ContainsRegex("stroke=\"#e69f00\"[^>]*>\n<circle[^>]*>\n<text[^>]*>estimated<"));
 }
 
 constexpr double kSide_mm = 60.0;
