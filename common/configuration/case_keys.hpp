@@ -270,7 +270,8 @@ void visit(A& a, V& v) {
     v.gravity_direction_sd_deg, between(0.0, 80.0));
   a({"gravity_sides_sd", "in units of the full buoyancy load",
      "How differently fluid drains on the left and on the right: air on one side", "decision 0037",
-     "0: no such modes."},
+     "0: no such modes. Where a falx parts the halves: 0.58 of the drainage, and as strong as that "
+     "turns out (decision 0045)."},
     v.gravity_sides_sd, between(0.0, 8.0));
   a({"gravity_ends_sd", "in units of the full buoyancy load", "The same in front and at the back",
      "decision 0037", "0: no such modes."},

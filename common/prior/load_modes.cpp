@@ -53,18 +53,6 @@ void add_gravity(const BrainModel& model, const CaseConfig& config, Columns& out
     return fem::buoyancy_load(model.mesh, config.material, g, model.fluid_plane_depth_mm + level_mm,
                               direction);
   };
-  for (const double level : prior.gravity_levels_mm) {
-    out.add(PriorPart::kAlongGravity, prior.gravity_mode_sd, load(level, g));
-  }
-  const double across_sd =
-      prior.gravity_mode_sd * std::tan(prior.gravity_direction_sd_deg * std::numbers::pi / 180.0);
-  if (across_sd > 0.0) {
-    const auto [first, second] = across(g);
-    for (const double level : prior.gravity_levels_mm) {
-      out.add(PriorPart::kAcrossGravity, across_sd, load(level, first));
-      out.add(PriorPart::kAcrossGravity, across_sd, load(level, second));
-    }
-  }
   const Vec3 middle =
       0.5 * (model.mesh.nodes.rowwise().minCoeff() + model.mesh.nodes.rowwise().maxCoeff());
   const auto add_uneven = [&](PriorPart part, double sd, int axis) {
@@ -75,7 +63,21 @@ void add_gravity(const BrainModel& model, const CaseConfig& config, Columns& out
       out.add(part, sd, load(level, g).array().rowwise() * side.array());
     }
   };
-  add_uneven(PriorPart::kGravitySides, prior.gravity_sides_sd, 0);
+  const bool parted = !model.septa.slaves.empty() && prior.gravity_sides_sd > 0.0;
+  for (const double level : prior.gravity_levels_mm) {
+    out.add(PriorPart::kAlongGravity, prior.gravity_mode_sd, load(level, g));
+  }
+  if (parted) add_uneven(PriorPart::kAlongGravity, kHalvesApart * prior.gravity_mode_sd, 0);
+  const double across_sd =
+      prior.gravity_mode_sd * std::tan(prior.gravity_direction_sd_deg * std::numbers::pi / 180.0);
+  if (across_sd > 0.0) {
+    const auto [first, second] = across(g);
+    for (const double level : prior.gravity_levels_mm) {
+      out.add(PriorPart::kAcrossGravity, across_sd, load(level, first));
+      out.add(PriorPart::kAcrossGravity, across_sd, load(level, second));
+    }
+  }
+  if (!parted) add_uneven(PriorPart::kGravitySides, prior.gravity_sides_sd, 0);
   add_uneven(PriorPart::kGravityEnds, prior.gravity_ends_sd, 1);
 }
 

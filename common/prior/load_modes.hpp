@@ -7,7 +7,9 @@
 //                          across it (pose is unknown)
 //   gravity sides, ends    the same along gravity, times tanh(x / kMidlineWidth_mm) of the distance
 //                          x from the brain's middle to the right, or to the front: fluid does not
-//                          drain, nor air enter, everywhere alike
+//                          drain, nor air enter, everywhere alike. Where septa part the halves,
+//                          what drains of one says little of the other: the sides then belong to
+//                          drainage, kHalvesApart as strong and with its strength (decision 0045)
 //   tumour volume          tissue that changes its volume by the strain theta near the tumour with
 //                          centre c (fem/body_loads.hpp): oedema lies beside a tumour and differs
 //                          from place to place. For each radius s of the case bumps
@@ -56,6 +58,8 @@ namespace brainshift::prior {
 
 // Width of the step between the hemispheres.
 inline constexpr double kMidlineWidth_mm = 10.0;
+// Given what one half has lost, the other one's mean is (1 - k^2) / (1 + k^2) of it: a half.
+inline constexpr double kHalvesApart = 0.58;
 // Half of a brain's width: what swells with a tumour lies in its hemisphere.
 inline constexpr double kTumourVolumeReach_mm = 75.0;
 

@@ -80,6 +80,29 @@ TEST(LoadModes, BuoyancyDiffersBetweenSidesAndBetweenEnds) {
   }
 }
 
+// Half of what one side loses is the mean of the other: a prior that knows nothing of it.
+TEST(LoadModes, WhereSeptaPartTheHalvesUnevennessIsAPartOfDrainage) {
+  BrainModel patient = test_support::toy_patient(8);
+  patient.septa.slaves = {0};
+  CaseConfig config = only(0.7, 0.0, 0.0, 0.0, 0.0, 0.0);
+  config.prior.gravity_direction_sd_deg = 0.0;
+  config.prior.gravity_sides_sd = 0.25;
+  const LoadModes modes = modes_of(patient, config);
+  const PerPart<int> expected = {4, 0, 0, 0};
+  ASSERT_EQ(modes.of_part, expected);
+  const Points& nodes = patient.mesh.nodes;
+  const double middle = 0.5 * (nodes.row(0).minCoeff() + nodes.row(0).maxCoeff());
+  for (int level : {0, 1}) {
+    const auto both = mode(modes.columns, level), apart = mode(modes.columns, 2 + level);
+    for (Eigen::Index i = 0; i < nodes.cols(); ++i) {
+      const double side = std::tanh((nodes(0, i) - middle) / kMidlineWidth_mm);
+      ASSERT_LE((apart.col(i) - kHalvesApart * side * both.col(i)).norm(), 1e-12 * both.norm());
+    }
+  }
+  config.prior.gravity_sides_sd = 0.0;
+  EXPECT_EQ(modes_of(patient, config).of_part[0], 2);
+}
+
 // No net force and no net moment.
 TEST(LoadModes, SwellingAndStressBalanceThemselves) {
   const BrainModel patient = test_support::toy_patient();
