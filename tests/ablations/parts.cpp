@@ -17,7 +17,8 @@ constexpr double kDensity_n_m3 = 1000.0, kDirectionSd_deg = 10.0;
 constexpr double kWeightSd = 1.0, kStressSd_pa = 300.0;
 // A tracked probe as decision 0020 has it, which a client would state.
 constexpr double kProbePoseSd_mm = 0.5, kProbePoseSd_deg = 0.5;
-constexpr int kLowRank = 104, kHighRank = 192;  // 92 are load families
+// Half as many and twice as many modes of residual fields beside the 125 of load families.
+constexpr int kLowRank = 157, kHighRank = 253;
 
 Part part(std::string variant, Anew anew, std::vector<std::string> keys, Change change) {
   return {{std::move(variant), anew, Boundary::kContact, std::move(change)}, std::move(keys)};
@@ -43,6 +44,12 @@ std::vector<Part> prior_parts() {
          [](CaseConfig& c) { c.prior.brain_volume_strain_sd = 0.0; }),
       of("no-opening", {"prior.opening_pressure_sd_pa"},
          [](CaseConfig& c) { c.prior.opening_pressure_sd_pa = 0.0; }),
+      of("no-unevenness", {"prior.gravity_sides_sd", "prior.gravity_ends_sd"},
+         [](CaseConfig& c) { c.prior.gravity_sides_sd = c.prior.gravity_ends_sd = 0.0; }),
+      of("no-tract", {"prior.tract_pressure_sd_pa"},
+         [](CaseConfig& c) { c.prior.tract_pressure_sd_pa = 0.0; }),
+      of("no-ventricle-volume", {"prior.ventricle_volume_strain_sd"},
+         [](CaseConfig& c) { c.prior.ventricle_volume_strain_sd = 0.0; }),
       of("no-medium", {"prior.medium_density_sd_n_m3"},
          [](CaseConfig& c) { c.prior.medium_density_sd_n_m3 = 0.0; }),
       of("no-coarse", {"prior.coarse_density_sd_n_m3"},
@@ -66,6 +73,8 @@ std::vector<Part> data_parts() {
   return {
       of("fixed-strengths", {"prior.scales"},
          [](CaseConfig& c) { c.prior.estimate_scales = false; }),
+      of("no-broad-hypothesis", {"prior.broad_weight"},
+         [](CaseConfig& c) { c.prior.broad_weight = 0.0; }),
       of("no-shared-errors", {"sensing.surface_pose_sd_mm", "sensing.surface_pose_sd_deg"},
          [](CaseConfig& c) { c.sensing.surface_pose_sd_mm = c.sensing.surface_pose_sd_deg = 0.0; }),
       of("no-robust-weights", {"sensing.outliers"},
