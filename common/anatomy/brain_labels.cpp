@@ -1,9 +1,12 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "common/anatomy/brain_labels.hpp"
 
+#include <fmt/format.h>
+
 #include <cctype>
 #include <cmath>
 #include <cstdint>
+#include <numeric>
 #include <set>
 #include <string_view>
 #include <vector>
@@ -204,6 +207,14 @@ Result<VoxelImage> brain_from_labels(const VoxelImage& map, double closing_mm) {
     }
   }
   VoxelImage mask{map.dims, map.T_ras_voxel, std::vector<float>(voxels.begin(), voxels.end())};
+  const double cc = std::accumulate(voxels.begin(), voxels.end(), 0.0) *
+                    std::abs(map.T_ras_voxel.linear().determinant()) / 1000.0;
+  if (cc > kLargestBrain_cc) {
+    return invalid(
+        fmt::format("has {:.0f} cc of brain by FreeSurfer's numbers, at most {:.0f} are "
+                    "one: is it an image, or a map by other numbers?",
+                    cc, kLargestBrain_cc));
+  }
   return mask;
 }
 

@@ -27,12 +27,15 @@ constexpr float kWholeNumber = 1e-3F;
 // A label map has fewer different values, an interpolated mask more.
 constexpr std::size_t kFewValues = 16;
 constexpr double kTop = 0.9, kLeastTop = 1.0 / 3.0;
+constexpr double kBackground = 0.05;  // what a network leaves outside of a mask
 constexpr double kLargestRipple = 0.05;
 constexpr double kLargestLostPart = 0.1;
 constexpr double kLittle = 0.1;
 constexpr const char* kNothingToDo = "nothing to do";
 // A head has 3,000 to 5,000 cc, the largest brains 1,900.
-constexpr double kLargestBrain_cc = 2500.0;
+// A smaller one has no surface; no head is larger. Half of a brain.
+constexpr double kLeastTumour_mm = 0.5, kLongestTumour_mm = 250.0, kLargestTumour_cc = 900.0;
+constexpr double kLargestImage_cc = 64000.0;
 constexpr std::size_t kManyLabels = 60;
 constexpr double kLeastAlike = 0.25;
 
@@ -43,7 +46,9 @@ double voxel_mm3(const VoxelImage& image) {
 }
 
 struct MaskValues {
-  std::size_t positive = 0, negative = 0, top = 0;  // top: from kTop of the largest value on
+  std::size_t positive = 0, negative = 0;
+  // From kTop, and from kBackground of the largest value on.
+  std::size_t top = 0, foreground = 0;
   float least = 0.0F, most = 0.0F;
   bool one_negative = true, whole = true;
   std::set<float> different;  // of those > 0, up to kFewValues + 1
@@ -64,7 +69,11 @@ MaskValues values_of(const VoxelImage& image) {
       if (values.different.size() <= kFewValues) values.different.insert(v);
     }
   }
-  for (const float v : image.values) values.top += v >= kTop * values.most && v > 0.0F ? 1 : 0;
+  for (const float v : image.values) {
+    if (!(v > 0.0F)) continue;
+    values.top += v >= kTop * values.most ? 1 : 0;
+    values.foreground += v >= kBackground * values.most ? 1 : 0;
+  }
   return values;
 }
 
@@ -73,7 +82,7 @@ bool is_soft(const MaskValues& values) {
   const bool between =
       values.different.size() > 1 && (!values.whole || values.different.size() > kFewValues);
   return between &&
-         static_cast<double>(values.top) >= kLeastTop * static_cast<double>(values.positive);
+         static_cast<double>(values.top) >= kLeastTop * static_cast<double>(values.foreground);
 }
 
 // The greatest value of a soft mask's plateau, which a spline overshoots.
@@ -150,11 +159,19 @@ Result<VoxelImage> brain_mask(const VoxelImage& image, const std::string& what, 
     return fail(largest.error().code, fmt::format("{}: {}", what, largest.error().message));
   }
   const double cc = geometry::mask_centre(*largest).volume_mm3 / kMm3PerCc;
-  if (cc > kLargestBrain_cc && !is_soft(values) && values.different.size() > kFewValues) {
+  // Of a mask in other units its extent tells more.
+  const bool too_large = cc > kLargestBrain_cc && cc < kLargestImage_cc;
+  if (too_large && values.different.size() > kFewValues) {
     return invalid(fmt::format(
-        "{}: is an image of the whole head, not a brain: {:.0f} cc of it are above 0, with more "
-        "than {} different values; give a mask, or the image without skull and face",
-        what, cc, kFewValues));
+        "{}: is an image of the whole head, not a brain: {:.0f} cc of it are above {:.3g}, with "
+        "more than {} different values; give a mask, or the image without skull and face",
+        what, cc, std::max(0.0F, level), kFewValues));
+  }
+  if (too_large) {
+    return invalid(
+        fmt::format("{}: {:.0f} cc are no brain (at most {:.0f} cc): is it turned inside "
+                    "out, or the whole head? 1 in the brain and 0 outside",
+                    what, cc, kLargestBrain_cc));
   }
   const geometry::MaskParts parts = geometry::mask_parts(mask);
   if (parts.voxels.size() < 2) return largest;
@@ -339,12 +356,38 @@ Focus cut_out(const VoxelImage& image, const geometry::MaskParts& parts, std::in
   return focus;
 }
 
+// Lengths in other units, and the background.
+Status check_size(const VoxelImage& mask, const std::string& what) {
+  Vec3 low = Vec3::Constant(std::numeric_limits<double>::infinity()), high = -low;
+  std::size_t voxels = 0;
+  geometry::for_each_voxel(
+      mask, [](float v) { return v > 0.0F; },
+      [&](std::size_t, const Vec3& x) {
+        low = low.cwiseMin(x), high = high.cwiseMax(x);
+        ++voxels;
+      });
+  if (voxels == 0) return {};
+  const double edge = mask.T_ras_voxel.linear().colwise().norm().minCoeff();
+  const Vec3 size = (high - low).array() + edge;
+  if (Status fits = check_extent(size, what + ": the tumour's", kLeastTumour_mm, kLongestTumour_mm);
+      !fits) {
+    return fits;
+  }
+  const double cc = static_cast<double>(voxels) * voxel_mm3(mask) / kMm3PerCc;
+  if (cc <= kLargestTumour_cc) return {};
+  return invalid(
+      fmt::format("{}: {:.0f} cc are no tumour (at most {:.0f} cc): is it the "
+                  "background, or the brain?",
+                  what, cc, kLargestTumour_cc));
+}
+
 }  // namespace
 
 Result<std::vector<Focus>> tumour_foci(const VoxelImage& image, const std::vector<int>& labels,
                                        double margin_mm, const std::string& what, Notes* notes) {
   const auto mask = label_mask(image, labels, what, notes);
   if (!mask) return tl::unexpected(mask.error());
+  if (Status sized = check_size(*mask, what); !sized) return tl::unexpected(sized.error());
   const geometry::MaskParts parts = geometry::mask_parts(*mask);
   std::vector<Focus> foci;
   std::size_t specks = 0;

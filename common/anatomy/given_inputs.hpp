@@ -26,15 +26,19 @@ bool asks_nothing(const std::string& note);
 // metres or micrometres where those would fit.
 Status check_extent(const Vec3& size_mm, const std::string& what, double least_mm, double most_mm);
 
+// A head has 3,000 to 5,000 cc, the largest brains 1,900.
+inline constexpr double kLargestBrain_cc = 2500.0;
+
 // The voxels of a brain mask or a skull-stripped image as 1, all others as 0.
 //   values > 0                         are brain; one value below 0 (-1) is the background's
-//   a soft mask (a third of the voxels > 0 are within a tenth of the largest value, and values lie
-//   between)                           brain from half of that value on; noted
+//   a soft mask (a third of the voxels above a twentieth of the largest value are within a tenth of
+//   it, and values lie between)        brain from half of that value on; noted
 //   ripples below 0, of at most a twentieth of the largest value
 //                                      brain above as much; noted
 //   more below 0                       kInvalidArgument: an image (normalised) and no mask
-//   more than 16 different values, and the largest part above 2500 cc
-//                                      kInvalidArgument: an image of the whole head
+//   the largest part above kLargestBrain_cc (and within 64,000 cc)
+//                                      kInvalidArgument: an image of the whole head (more than 16
+//                                      different values), or one turned inside out
 // Of several parts the largest counts; the others are noted. kInvalidArgument: a second part of
 // more than a tenth of the volume. kEmptySet: no voxel > 0.
 Result<VoxelImage> brain_mask(const VoxelImage& image, const std::string& what, Notes* notes);
@@ -58,7 +62,8 @@ inline constexpr double kSmallestFocus_mm3 = 50.0;
 // volume; specks that are left out. A probability map (values 0 to 1, label 1) counts from one
 // half on; noted.
 // kEmptySet: no voxel has a label; the sentence lists those that are there, with their volumes.
-// kInvalidArgument: values that are no whole numbers.
+// kInvalidArgument: values that are no whole numbers; all together less than 0.5 or more than
+// 250 mm long (check_extent), or above 900 cc.
 Result<std::vector<Focus>> tumour_foci(const VoxelImage& image, const std::vector<int>& labels,
                                        double margin_mm, const std::string& what, Notes* notes);
 

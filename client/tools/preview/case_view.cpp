@@ -409,7 +409,7 @@ std::vector<std::string> doubts(const CaseView& view) {
   if (view.leak_mm3 > anatomy::kLeak_mm3) {
     lines.push_back(fmt::format(
         "{:.0f} cc of images.brain hang on the rest by a thin neck, at {}: did the mask leak into "
-        "an orbit, the scalp or the skull?",
+        "an orbit, the scalp or the skull, or is it the spinal cord?",
         view.leak_mm3 / kMm3PerCc, place_text(view.leak_centre)));
   }
   doubt_mri(view, lines);

@@ -21,6 +21,10 @@ namespace {
 
 constexpr double kMargin_mm = 12.0;
 constexpr double kSlice_px_per_mm = 4.0;
+// A picture of more shows nothing of a head.
+constexpr double kFarthest_mm = 500.0;
+constexpr std::array kFiles = {"slices-tumour.png", "slices-middle.png", "slices-craniotomy.png",
+                               "surface.png", "preview.txt"};
 
 const Stroke kTumour{palette::kOrange, 5, 0.0};
 const Stroke kSeptum{meaning::kSeptum, 5, 0.0, 2};
@@ -97,15 +101,20 @@ class Box {
   Vec3 high_ = Vec3::Constant(-std::numeric_limits<double>::infinity());
 };
 
-// The tumour and the brain of a label map, wherever they lie; without any of these the image.
+// The brain, the tumour, and the brain of a label map unless it is far away; without a brain the
+// image too.
 Box box_of(const CaseView& view) {
   Box box;
   box.add(view.brain.vertices);
   box.add(view.tumour.vertices);
-  for (const auto* mask : {&view.brain_voxels, &view.tumour_voxels, &view.label_voxels}) {
-    box.add(*mask);
+  for (const auto* mask : {&view.brain_voxels, &view.tumour_voxels}) box.add(*mask);
+  if (!box.empty() && view.label_voxels) {
+    Box with_labels = box;
+    with_labels.add(view.label_voxels);
+    if ((with_labels.high() - with_labels.low()).maxCoeff() <= kFarthest_mm) box = with_labels;
   }
-  if (!box.empty() || !view.background) return box;
+  const bool has_brain = view.brain.num_vertices() > 0 || view.brain_voxels;
+  if (has_brain || !view.background) return box;
   const auto& dims = view.background->dims;
   for (int corner = 0; corner < 8; ++corner) {
     const auto end = [&](int axis) {
@@ -118,7 +127,9 @@ Box box_of(const CaseView& view) {
 
 SliceWindow window_of(const Box& box, Plane plane, const Vec3& through) {
   const Vec3 low = box.low(), high = box.high();
-  SliceWindow window{plane, 0.0, 0.0, 0.0, 0.0, 0.0, kSlice_px_per_mm};
+  const double longest = (high - low).maxCoeff();
+  SliceWindow window{
+      plane, 0.0, 0.0, 0.0, 0.0, 0.0, kSlice_px_per_mm * std::min(1.0, kFarthest_mm / longest)};
   window.offset_mm = through(window.normal_axis());
   window.across_min = low(window.across_axis());
   window.across_max = high(window.across_axis());
@@ -251,8 +262,10 @@ cv::Mat surface_picture(const CaseView& view) {
 Result<PreviewSummary> write_preview(const fs::path& case_file, const fs::path& out,
                                      const Progress& progress) {
   const auto view = view_case(case_file, progress);
-  if (!view) return tl::unexpected(view.error());
   std::error_code failed;
+  // Those of an earlier run would show another case.
+  for (const char* name : kFiles) fs::remove(out / name, failed);
+  if (!view) return tl::unexpected(view.error());
   fs::create_directories(out, failed);
   if (failed) return io::write_failed(out, failed.message());
   PreviewSummary summary{facts(*view), doubts(*view), view->problems, {}};
@@ -268,11 +281,6 @@ Result<PreviewSummary> write_preview(const fs::path& case_file, const fs::path& 
                           slices_picture(*view, opening->centre, "craniotomy's centre"));
   }
   if (view->brain.num_vertices() > 0) pictures.emplace_back("surface.png", surface_picture(*view));
-  // Those of an earlier run would show another case.
-  for (const char* name :
-       {"slices-tumour.png", "slices-middle.png", "slices-craniotomy.png", "surface.png"}) {
-    fs::remove(out / name, failed);
-  }
   for (const auto& [name, image] : pictures) {
     const auto png = encode_png((out / name).string(), image);
     if (!png) return tl::unexpected(png.error());

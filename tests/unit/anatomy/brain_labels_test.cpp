@@ -70,5 +70,12 @@ TEST(BrainLabels, AMapOfOtherNumbersIsRefusedWithItsLabels) {
               HasSubstr("it has 2 ("));
 }
 
+TEST(BrainLabels, MoreThanABrainIsNone) {
+  VoxelImage large = labelled_head();
+  large.T_ras_voxel.linear() *= 4.8;
+  EXPECT_THAT(refusal_of(brain_from_labels(large, 0.0), ErrorCode::kInvalidArgument),
+              HasSubstr("cc of brain by FreeSurfer's numbers, at most 2500 are one"));
+}
+
 }  // namespace
 }  // namespace brainshift::anatomy

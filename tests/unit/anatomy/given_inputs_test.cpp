@@ -117,13 +117,22 @@ TEST(Notes, SayWhetherThereIsSomethingToDo) {
 TEST(BrainMask, AnImageOfTheWholeHeadIsNoBrain) {
   VoxelImage head = balls({{Vec3::Zero(), 20.0}});
   head.T_ras_voxel.linear() *= 4.3;  // 2,664 cc
-  EXPECT_GT(sum(value_or_fail(brain_mask(head, "m", nullptr))), 0.0) << "a mask may be as large";
+  EXPECT_THAT(refused(brain_mask(head, "m", nullptr)),
+              AllOf(HasSubstr("m: 266"), HasSubstr("turned inside out, or the whole head?")));
   int n = 0;
   for (float& v : head.values) v *= static_cast<float>(1 + n++ % 200);
   EXPECT_THAT(refused(brain_mask(head, "m", nullptr)),
               AllOf(HasSubstr("m: is an image of the whole head, not a brain"), HasSubstr("cc")));
   head.T_ras_voxel.linear() *= 0.95;
   EXPECT_GT(sum(value_or_fail(brain_mask(head, "m", nullptr))), 0.0);
+}
+
+TEST(BrainMask, WhatANetworkLeavesOutsideOfASoftMaskIsNoBrain) {
+  VoxelImage image = soft_ball(20.0);
+  const VoxelImage mask = value_or_fail(brain_mask(image, "m", nullptr));
+  int n = 0;
+  for (float& v : image.values) v = std::max(v, 1e-4F * static_cast<float>(1 + n++ % 100));
+  EXPECT_EQ(value_or_fail(brain_mask(image, "m", nullptr)).values, mask.values);
 }
 
 TEST(BrainMask, RipplesAreNoBrain) {
@@ -163,6 +172,19 @@ TEST(TumourFoci, EveryFocusIsKeptAndToldWithItsVolume) {
   EXPECT_EQ(sum(foci[1].mask), foci[1].volume_mm3);
   EXPECT_THAT(notes, ElementsAre(AllOf(HasSubstr("2 parts: 2.1"), HasSubstr("0.5")),
                                  HasSubstr("specks below 0.05 cc are left out: 1, 0.008 cc")));
+}
+
+TEST(TumourFoci, OtherUnitsAndTheBackgroundAreNoTumour) {
+  VoxelImage image = balls({{Vec3::Zero(), 10.0}});
+  image.T_ras_voxel.linear() *= 1e-3;
+  EXPECT_THAT(refused(tumour_foci(image, {1}, 3.0, "t", nullptr)),
+              AllOf(HasSubstr("t: the tumour's extent 0.02"), HasSubstr("metres instead")));
+  image.T_ras_voxel.linear() *= 1e6;
+  EXPECT_THAT(refused(tumour_foci(image, {1}, 3.0, "t", nullptr)),
+              HasSubstr("micrometres instead of millimetres?"));
+  image.T_ras_voxel.linear() *= 6e-3;  // a ball of 905 cc
+  EXPECT_THAT(refused(tumour_foci(image, {1}, 3.0, "t", nullptr)),
+              AllOf(HasSubstr("t: 9"), HasSubstr("is it the background, or the brain?")));
 }
 
 TEST(TumourFoci, AFocusAtTheImagesBorderHasAMarginBeyondIt) {

@@ -98,6 +98,12 @@ TEST(Preview, LeavesNothingBehindForACaseThatCannotBeRead) {
   const auto summary = write_preview(folder.write("bad.yaml", "case_id: [\n"), folder / "out");
   ASSERT_FALSE(summary);
   EXPECT_FALSE(std::filesystem::exists(folder / "out"));
+  value_or_fail(write_preview(write_box_case(folder), folder / "out"));
+  folder.write("out/own.png", "");
+  ASSERT_FALSE(write_preview(folder / "bad.yaml", folder / "out"));
+  for (const auto& file : std::filesystem::directory_iterator(folder / "out")) {
+    EXPECT_EQ(file.path().filename(), "own.png") << "a picture of another case";
+  }
 }
 
 }  // namespace
