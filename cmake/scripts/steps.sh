@@ -50,8 +50,8 @@ empty_study() {
   echo "study,reason" >"$1/left_out.csv"
 }
 
-# resume_study DIR RESUME: the same, but with RESUME=1 the rows-*.csv that DIR has stay. Programs find it as
-# BRAINSHIFT_STUDY_DIR.
+# resume_study DIR RESUME: the same, but with RESUME=1 the rows-*.csv and outlines-*.csv that DIR has stay.
+# Programs find it as BRAINSHIFT_STUDY_DIR.
 resume_study() {
   local kept
   kept=$(mktemp -d)

@@ -6,12 +6,12 @@
 #include <cctype>
 #include <cmath>
 #include <cstdint>
-#include <numeric>
 #include <set>
 #include <string_view>
 #include <vector>
 
 #include "common/anatomy/given_inputs.hpp"
+#include "common/geometry/mask.hpp"
 
 namespace brainshift::anatomy {
 namespace {
@@ -207,8 +207,7 @@ Result<VoxelImage> brain_from_labels(const VoxelImage& map, double closing_mm) {
     }
   }
   VoxelImage mask{map.dims, map.T_ras_voxel, std::vector<float>(voxels.begin(), voxels.end())};
-  const double cc = std::accumulate(voxels.begin(), voxels.end(), 0.0) *
-                    std::abs(map.T_ras_voxel.linear().determinant()) / 1000.0;
+  const double cc = geometry::mask_centre(mask).volume_mm3 / 1000.0;
   if (cc > kLargestBrain_cc) {
     return invalid(
         fmt::format("has {:.0f} cc of brain by FreeSurfer's numbers, at most {:.0f} are "

@@ -38,7 +38,8 @@ Result<VoxelImage> with_freesurfer_numbers(const VoxelImage& map,
 // 1 where the map has cerebrum, cerebellum, brainstem or a ventricle, and in sulci: where the fluid
 // (24) or background lies in gaps up to about 2 closing_mm wide between them; else 0.
 // kInvalidArgument: no voxel has a label of the brain, or no two structures of cerebrum, cerebellum
-// and brainstem are there: not FreeSurfer's numbers. The sentence lists the labels.
+// and brainstem are there: not FreeSurfer's numbers, and the sentence lists the labels; or the mask
+// has more than kLargestBrain_cc (given_inputs.hpp).
 Result<VoxelImage> brain_from_labels(const VoxelImage& map, double closing_mm = 3.0);
 
 }  // namespace brainshift::anatomy

@@ -32,10 +32,9 @@ constexpr double kLargestRipple = 0.05;
 constexpr double kLargestLostPart = 0.1;
 constexpr double kLittle = 0.1;
 constexpr const char* kNothingToDo = "nothing to do";
-// A head has 3,000 to 5,000 cc, the largest brains 1,900.
-// A smaller one has no surface; no head is larger. Half of a brain.
+// A shorter tumour has no surface, and none is longer than a head or has half of a brain's volume.
 constexpr double kLeastTumour_mm = 0.5, kLongestTumour_mm = 250.0, kLargestTumour_cc = 900.0;
-constexpr double kLargestImage_cc = 64000.0;
+constexpr double kLargestImage_cc = 64000.0;  // a cube of 400 mm
 constexpr std::size_t kManyLabels = 60;
 constexpr double kLeastAlike = 0.25;
 
@@ -358,22 +357,15 @@ Focus cut_out(const VoxelImage& image, const geometry::MaskParts& parts, std::in
 
 // Lengths in other units, and the background.
 Status check_size(const VoxelImage& mask, const std::string& what) {
-  Vec3 low = Vec3::Constant(std::numeric_limits<double>::infinity()), high = -low;
-  std::size_t voxels = 0;
-  geometry::for_each_voxel(
-      mask, [](float v) { return v > 0.0F; },
-      [&](std::size_t, const Vec3& x) {
-        low = low.cwiseMin(x), high = high.cwiseMax(x);
-        ++voxels;
-      });
-  if (voxels == 0) return {};
+  const geometry::MaskCentre found = geometry::mask_centre(mask);
+  if (found.volume_mm3 == 0.0) return {};
   const double edge = mask.T_ras_voxel.linear().colwise().norm().minCoeff();
-  const Vec3 size = (high - low).array() + edge;
+  const Vec3 size = (found.high - found.low).array() + edge;
   if (Status fits = check_extent(size, what + ": the tumour's", kLeastTumour_mm, kLongestTumour_mm);
       !fits) {
     return fits;
   }
-  const double cc = static_cast<double>(voxels) * voxel_mm3(mask) / kMm3PerCc;
+  const double cc = found.volume_mm3 / kMm3PerCc;
   if (cc <= kLargestTumour_cc) return {};
   return invalid(
       fmt::format("{}: {:.0f} cc are no tumour (at most {:.0f} cc): is it the "

@@ -248,10 +248,20 @@ MaskCentre mask_centre(const VoxelImage& mask) {
   MaskCentre found;
   double count = 0.0;
   const auto is_in = [](float value) { return value > 0.0F; };
-  for_each_voxel(mask, is_in, [&](std::size_t, const Vec3& x) { found.centre += x, count += 1.0; });
+  for_each_voxel(mask, is_in, [&](std::size_t, const Vec3& x) {
+    found.centre += x, count += 1.0;
+    found.low = found.low.cwiseMin(x), found.high = found.high.cwiseMax(x);
+  });
   if (count > 0.0) found.centre /= count;
   found.volume_mm3 = count * std::abs(mask.T_ras_voxel.linear().determinant());
   return found;
+}
+
+bool mask_has(const VoxelImage& mask, const AffineTransform& T_voxel_ras, const Vec3& x) {
+  const Eigen::Vector3i at = (T_voxel_ras * x).array().round().cast<int>();
+  const bool there = (at.array() >= 0).all() && at[0] < mask.dims[0] && at[1] < mask.dims[1] &&
+                     at[2] < mask.dims[2];
+  return there && mask.at(at[0], at[1], at[2]) > 0.0F;
 }
 
 MaskParts mask_parts(const VoxelImage& image) {

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <cstdint>
+#include <limits>
 #include <vector>
 
 #include "common/core/error.hpp"
@@ -24,12 +25,18 @@ void for_each_voxel(const VoxelImage& image, const Is& is, const Visit& visit) {
   }
 }
 
-// Of the voxels > 0: the mean of their centres (mm RAS; 0 without any) and their volume.
+// Of the voxels > 0: the mean of their centres (mm RAS; 0 without any), between which places these
+// lie (low above high without any), and their volume.
 struct MaskCentre {
   Vec3 centre = Vec3::Zero();
+  Vec3 low = Vec3::Constant(std::numeric_limits<double>::infinity()), high = -low;
   double volume_mm3 = 0.0;
 };
 MaskCentre mask_centre(const VoxelImage& mask);
+
+// Whether the voxel at x, mm RAS, is > 0; false outside of the image. T_voxel_ras: the inverse of
+// the mask's own transform.
+bool mask_has(const VoxelImage& mask, const AffineTransform& T_voxel_ras, const Vec3& x);
 
 // 1 where the voxel is > 0 and belongs to the largest 6-connected component, or to a cavity of
 // it; else 0. A cavity is a 6-connected set of other voxels that does not reach the border of the

@@ -132,14 +132,13 @@ def test_the_page_says_where_to_measure_next_as_the_command_does(browser, surger
     shown = browser.js("[...document.querySelectorAll('#advice-rows tr')].map(row => [...row.children].map(cell => cell.textContent))")
     figures = lambda one: [f"{one['reduction_mm']:.2f}", f"{one['sd_after_mm']:.2f}"]
     assert [row[1:] for row in shown] == [figures(one) for one in best]
-    # The last digits of two estimates decide between those that are equal as shown.
+    # The last digits of two estimates decide between candidates that are equal as shown.
     named = {one["name"]: one for one in told["candidates"] if one["reduction_mm"] is not None}
-    assert [row[0].split()[0] for row in shown] == ["1", "2", "3", "4", "5"]
-    first, *others = [named[row[0].partition(" ")[2]] for row in shown]
-    assert [row[1:] for row in shown] == [figures(one) for one in (first, *others)]
+    places, names = zip(*(row[0].split(" ", 1) for row in shown))
+    assert places == ("1", "2", "3", "4", "5") and [row[1:] for row in shown] == [figures(named[name]) for name in names]
     browser.js("document.querySelector('#advice-rows button').click()")
     was = re.search(r"in the MRI: R (\S+), A (\S+), S (\S+) ·", browser.text("cursor"))
-    assert np.allclose([float(n) for n in was.groups()], first["where_mm"], atol=0.15), "the cross goes to the first"
+    assert np.allclose([float(n) for n in was.groups()], named[names[0]]["where_mm"], atol=0.15), "the cross goes to the first"
     keep(browser, "advice")
     assert browser.js("document.getElementById('axial').toDataURL()") != before
     browser.js("document.getElementById('advice').click()")

@@ -124,18 +124,17 @@ Status check_reach(const Vec3& target, const std::string& name, const Vec3& midd
 Status check_in_brain(const Vec3& target, const std::string& name, const VoxelImage& mask,
                       const std::string& of) {
   double away = std::numeric_limits<double>::infinity(), in_metres = away;
-  Vec3 low = Vec3::Constant(away), high = -low;
   geometry::for_each_voxel(
       mask, [](float v) { return v > 0.0F; },
       [&](std::size_t, const Vec3& x) {
         away = std::min(away, (x - target).norm());
         in_metres = std::min(in_metres, (x - 1000.0 * target).norm());
-        low = low.cwiseMin(x), high = high.cwiseMax(x);
       });
   const std::string metres = geometry::metres_for_millimetres(
       target, [&](const Vec3&) { return in_metres <= kBesideBrain_mm; });
   if (!metres.empty()) return invalid(name + " " + metres);
   if (away <= kBesideBrain_mm) return {};
+  const auto [centre, low, high, volume] = geometry::mask_centre(mask);
   return invalid(fmt::format(
       "{} lies {:.0f} mm from {}, which reaches from ({:.0f}, {:.0f}, {:.0f}) to ({:.0f}, {:.0f}, "
       "{:.0f}): must lie within {:g} mm; is it mm RAS, and of this head?",

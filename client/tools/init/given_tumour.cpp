@@ -293,12 +293,7 @@ class BrainPlaces {
   explicit BrainPlaces(const VoxelImage& mask)
       : mask_(mask), T_voxel_ras_(mask.T_ras_voxel.inverse()) {}
 
-  bool has(const Vec3& x) const {
-    const Eigen::Vector3i at = (T_voxel_ras_ * x).array().round().cast<int>();
-    const bool there = (at.array() >= 0).all() && at[0] < mask_.dims[0] && at[1] < mask_.dims[1] &&
-                       at[2] < mask_.dims[2];
-    return there && mask_.at(at[0], at[1], at[2]) > 0.0F;
-  }
+  bool has(const Vec3& x) const { return geometry::mask_has(mask_, T_voxel_ras_, x); }
   double outside_share(const Points& places) const {
     double outside = 0.0;
     for (const auto& x : places.colwise()) outside += has(x) ? 0.0 : 1.0;

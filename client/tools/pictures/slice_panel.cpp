@@ -208,11 +208,8 @@ bool SlicePanel::draw_voxels(const VoxelImage& mask, const Stroke& stroke) {
   cv::Mat inside(image_.size(), CV_8UC1, cv::Scalar(0));
   for (int y = 0; y < inside.rows; ++y) {
     for (int x = 0; x < inside.cols; ++x) {
-      const Vec3 place = T_voxel_ras * window_.position({x + 0.5, y + 0.5});
-      const Eigen::Vector3i at = place.array().round().cast<int>();
-      const bool there = (at.array() >= 0).all() && at[0] < mask.dims[0] && at[1] < mask.dims[1] &&
-                         at[2] < mask.dims[2];
-      if (there && mask.at(at[0], at[1], at[2]) > 0.0F) inside.at<std::uint8_t>(y, x) = 1;
+      const Vec3 place = window_.position({x + 0.5, y + 0.5});
+      if (geometry::mask_has(mask, T_voxel_ras, place)) inside.at<std::uint8_t>(y, x) = 1;
     }
   }
   std::vector<std::vector<cv::Point>> edges;

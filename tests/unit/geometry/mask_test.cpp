@@ -69,6 +69,27 @@ std::vector<int> breadth_first(const VoxelImage& image, const std::vector<char>&
   return label;
 }
 
+// Two voxels of 8 mm3 in an image that is moved and enlarged.
+TEST(MaskCentre, TellsMiddleBoundsAndVolumeAndWhatTheMaskHas) {
+  VoxelImage mask;
+  mask.dims = {4, 3, 2};
+  mask.values.assign(24, 0.0F);
+  mask.values[1] = mask.values[3 + 4 * 2 + 12] = 1.0F;  // (1, 0, 0) and (3, 2, 1)
+  mask.T_ras_voxel = AffineTransform::Identity();
+  mask.T_ras_voxel.linear() *= 2.0;
+  mask.T_ras_voxel.translation() = Vec3(10, 0, 0);
+  const MaskCentre found = mask_centre(mask);
+  EXPECT_EQ(found.centre, Vec3(14, 2, 1));
+  EXPECT_EQ(found.low, Vec3(12, 0, 0));
+  EXPECT_EQ(found.high, Vec3(16, 4, 2));
+  EXPECT_EQ(found.volume_mm3, 16.0);
+  const AffineTransform T_voxel_ras = mask.T_ras_voxel.inverse();
+  EXPECT_TRUE(mask_has(mask, T_voxel_ras, Vec3(12.9, 0.9, -0.9)));
+  for (const Vec3& x : {Vec3(13.1, 0, 0), Vec3(12, -1.1, 0), Vec3(18, 4, 2)}) {
+    EXPECT_FALSE(mask_has(mask, T_voxel_ras, x));
+  }
+}
+
 TEST(MaskParts, AreNumberedFromTheLargest) {
   VoxelImage image;
   image.dims = {7, 1, 2};
