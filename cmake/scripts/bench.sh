@@ -172,6 +172,7 @@ latencies "@$kernel" short
 unset OPENBLAS_CORETYPE
 stages() {
   "$bin/bench_update" --model "$out/colin27.h5" --passes 1 --stages-csv "$out/stages.csv" \
+    --limits-csv "$out/limits.csv" \
     "$out"/{short,paper,no-contact,joint-sag,joint-mixed,distension}.surgery
 }
 step "stages: where the time of an update goes" stages

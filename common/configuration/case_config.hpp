@@ -226,7 +226,8 @@ struct CondensedConfig {
   int max_rank = 189;
   // Bound on the memory that preparation may use, GiB; more is refused before the work begins.
   double memory_limit_gib = 8.0;
-  // An update returns its best iterate when this time has passed, ms.
+  // An update's answer is due when this time has passed since its observation was taken up, ms: the
+  // best iterate by then (docs/decisions/0046).
   double deadline_ms = 3000.0;
   int max_contact_iterations = 100;
   // Nodes at which the standard deviation is evaluated; interpolated between them.

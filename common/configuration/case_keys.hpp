@@ -415,7 +415,10 @@ void visit(A& a, V& v) {
     v.max_rank, between(1, 2000));
   a({"memory_limit_gib", "GiB", "Bound on the memory of the preparation"}, v.memory_limit_gib,
     between(0.1, 1e4));
-  a({"deadline_ms", "ms", "An update returns its best iterate when this time has passed"},
+  a({"deadline_ms", "ms",
+     "An update's answer is due when this time has passed since its observation was taken up; the "
+     "best iterate by then",
+     "docs/decisions/0046"},
     v.deadline_ms, between(0.1, 1e6));
   a({"max_contact_iterations", "", "Largest number of steps of one descent"},
     v.max_contact_iterations, between(1, 1000));

@@ -4,7 +4,6 @@
 #include <iterator>
 #include <utility>
 
-#include "common/core/stopwatch.hpp"
 #include "common/geometry/surface.hpp"
 #include "common/pipeline/scene.hpp"
 
@@ -86,7 +85,7 @@ Result<Update> Pipeline::answer(const Observation& observation, const RunOptions
 
   const Stopwatch inverting;  // SparseData -> Estimate
   Estimate& estimate = update.estimate;
-  if (auto status = estimate_into(observation, options, update); !status) {
+  if (auto status = estimate_into(observation, options, inverting, update); !status) {
     evidence_.drop(observation.source);
     return tl::unexpected(status.error());
   }
@@ -116,12 +115,13 @@ Result<Update> Pipeline::answer(const Observation& observation, const RunOptions
 
 // The evidence's SparseData -> Estimate; once more without those that spoil it.
 Status Pipeline::estimate_into(const Observation& observation, const RunOptions& options,
-                               Update& update) {
+                               const Stopwatch& inverting, Update& update) {
   while (true) {
     const Stopwatch watch;
     const CombinedData combined(evidence_, observation.acquired_ns);
     inversion::InversionOptions asked;
     asked.stop = options.stop;
+    asked.spent_ms = update.timings.register_ms + inverting.milliseconds();
     asked.moving = combined.moving();
     if (options.on_iterate) {
       asked.on_iterate = [&](const Estimate& iterate) {

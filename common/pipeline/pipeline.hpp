@@ -16,6 +16,7 @@
 
 #include "common/configuration/case_config.hpp"
 #include "common/core/error.hpp"
+#include "common/core/stopwatch.hpp"
 #include "common/inversion/inverter.hpp"
 #include "common/pipeline/evidence.hpp"
 #include "common/pipeline/registration_stage.hpp"
@@ -66,7 +67,8 @@ class Pipeline {
            std::unique_ptr<inversion::Inverter> inverter, MakeInverter another,
            RegistrationTargets targets);
   Result<Update> answer(const Observation& observation, const RunOptions& options);
-  Status estimate_into(const Observation& observation, const RunOptions& options, Update& update);
+  Status estimate_into(const Observation& observation, const RunOptions& options,
+                       const Stopwatch& inverting, Update& update);
 
   CaseConfig config_;
   RegistrationTargets targets_;

@@ -128,7 +128,8 @@ struct SourceSummary {
   // of this source and what the other sources and the prior predict for them. degrees_of_freedom:
   // its expectation. p_value: probability of a larger chi_square by chance; where that is below
   // kInconsistent under the most probable hypothesis, the mean over the hypotheses. All three are
-  // NaN for a single source and for methods that do not compute them.
+  // NaN for a single source, for methods that do not compute them and where the deadline ended the
+  // search: its loads may contradict any source.
   double chi_square = std::numeric_limits<double>::quiet_NaN();
   double degrees_of_freedom = std::numeric_limits<double>::quiet_NaN();
   double p_value = std::numeric_limits<double>::quiet_NaN();

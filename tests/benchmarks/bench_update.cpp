@@ -2,6 +2,13 @@
 // How long an update takes and where the time goes: surgeries played through the daemon's pipeline
 // in this process, beside the time of one triangular solve with the model's factor.
 //   build/release/bin/bench_update --model M.h5 [--passes N] [--csv FILE] S.surgery...
+// With --limits-csv a row per surgery: what the answer of its median update takes at least, read
+// once and computed once at the speed of this machine: the linear model of its last set, one field.
+//   read      compliance of the active slaves, their modes, what data see of both, columns of modes
+//             and of active slaves that the field is summed from
+//   compute   factor of that compliance, response of the slaves to the modes, Jacobian, its Gram
+//             matrix and factor
+//   limit     the longer of the two, ms; machine: bytes and operations per second with all threads
 // With --fields the estimates are written too, for update_difference.py, which compares those of
 // two builds. Every update of the first pass: number of nodes n and of active slaves k, int32; 3n
 // displacements, mm, and n standard deviations, mm, float64; k nodes, int32.
@@ -10,16 +17,20 @@
 #include <cstdio>
 #include <filesystem>
 #include <fstream>
+#include <map>
 #include <memory>
 #include <string>
+#include <variant>
 #include <vector>
 
 #include "common/contact/forward_model.hpp"
 #include "common/core/statistics.hpp"
 #include "common/core/stopwatch.hpp"
+#include "common/core/thread_team.hpp"
 #include "common/inversion/inverter.hpp"
 #include "common/io/model/model_file.hpp"
 #include "common/io/recording/surgery_file.hpp"
+#include "common/linalg/blas.hpp"
 #include "common/linalg/openblas.hpp"
 #include "common/pipeline/pipeline.hpp"
 #include "common/wire/convert.hpp"
@@ -33,7 +44,7 @@ using inversion::UpdateProfile;
 using inversion::UpdateStage;
 
 struct Arguments {
-  std::string model_file, csv, stages_csv, fields;
+  std::string model_file, csv, stages_csv, limits_csv, fields;
   std::vector<std::string> surgeries;
   int passes = 5;
 };
@@ -80,7 +91,7 @@ struct Player {
 };
 
 struct Timed {
-  std::vector<double> ms, active, steps;
+  std::vector<double> ms, active, steps, rows;
   std::vector<std::vector<double>> stage_ms, stage_times;
 };
 
@@ -106,6 +117,18 @@ void write_field(const Estimate& estimate, std::ofstream& out) {
   write(estimate.active_slaves.data(), estimate.active_slaves.size());
 }
 
+// Rows of the Jacobian: three for a landmark, one for a distance.
+double rows_of(const Observation& observation, const Update& update,
+               std::map<std::string, int>& rows_of_source) {
+  rows_of_source[observation.source] =
+      std::holds_alternative<LandmarkPairs>(observation.body) ? 3 : 1;
+  double rows = 0.0;
+  for (const SourceSummary& source : update.estimate.sources) {
+    rows += source.data * rows_of_source[source.source];
+  }
+  return rows;
+}
+
 Timed play(Player& player, const std::vector<Observation>& observations, int passes,
            std::ofstream& fields) {
   Timed timed;
@@ -113,6 +136,7 @@ Timed play(Player& player, const std::vector<Observation>& observations, int pas
   timed.stage_times.resize(inversion::kUpdateStages);
   for (int pass = 0; pass < passes; ++pass) {
     player.pipeline->reset();
+    std::map<std::string, int> rows_of_source;
     for (const Observation& observation : observations) {
       const Stopwatch watch;
       const Update update = value_or_exit(player.pipeline->run(observation));
@@ -120,6 +144,7 @@ Timed play(Player& player, const std::vector<Observation>& observations, int pas
       if (pass == 0 && fields.is_open()) write_field(update.estimate, fields);
       timed.active.push_back(update.estimate.contact.active);
       timed.steps.push_back(update.estimate.contact.iterations);
+      timed.rows.push_back(rows_of(observation, update, rows_of_source));
       const UpdateProfile& profile = *player.inverter->profile();
       for (std::size_t i = 0; i < inversion::kUpdateStages; ++i) {
         timed.stage_ms[i].push_back(profile.stages[i].ms);
@@ -159,6 +184,53 @@ void write_stages(const std::string& name, const Timed& timed, double t_solve_ms
   row("update", timed.ms, 1);
 }
 
+struct Speed {
+  double bytes_per_ms = 0.0, operations_per_ms = 0.0;
+};
+
+// Of all threads together: sums over more memory than caches hold, products of matrices.
+Speed measure_speed() {
+  constexpr long kNumbers = 1L << 26, kSide = 1024;
+  ThreadTeam team(0);
+  const VecX numbers = VecX::Ones(kNumbers);
+  std::vector<double> sums(static_cast<std::size_t>(team.size()));
+  const double reading_ms = bench::median_ms(
+      [&] {
+        auto sum = [&](int member) {
+          const long part = kNumbers / team.size();
+          sums[static_cast<std::size_t>(member)] = numbers.segment(member * part, part).sum();
+        };
+        team.run(sum);
+      },
+      7, 1);
+  const Eigen::MatrixXd a = Eigen::MatrixXd::Ones(kSide, kSide);
+  Eigen::MatrixXd b = a;
+  const double computing_ms = bench::median_ms(
+      [&] {
+        team.split(kSide, [&](long begin, long end) {
+          linalg::blas::multiply(1.0, a, a.middleCols(begin, end - begin), 0.0,
+                                 b.middleCols(begin, end - begin));
+        });
+      },
+      7, 1);
+  return {8.0 * kNumbers / reading_ms, 2.0 * kSide * kSide * kSide / computing_ms};
+}
+
+void write_limit(const std::string& name, const Timed& timed, const CondensedOperators& operators,
+                 const Speed& speed, std::ofstream& csv) {
+  const double k = percentile(timed.active, 50.0), rows = percentile(timed.rows, 50.0);
+  const double r = operators.num_modes(), s = operators.num_slaves();
+  const double bytes = 8.0 * k * (0.5 * k + r) + 4.0 * rows * (r + k) +
+                       static_cast<double>(operators.responses.bytes()) * (r + k) / (r + s);
+  const double operations =
+      k * k * k / 3.0 + 2.0 * k * k * r + 2.0 * rows * k * r + rows * r * r + r * r * r / 3.0;
+  const double limit_ms =
+      std::max(bytes / speed.bytes_per_ms, operations / speed.operations_per_ms);
+  csv << name << ',' << percentile(timed.ms, 50.0) << ',' << k << ',' << rows << ',' << bytes << ','
+      << operations << ',' << limit_ms << ',' << 1e3 * speed.bytes_per_ms << ','
+      << 1e3 * speed.operations_per_ms << '\n';
+}
+
 void run(const Arguments& arguments) {
   const Head head = load(arguments.model_file);
   std::printf("%d nodes, %d slaves, %d modes; t_solve %.1f ms; BLAS kernel %s\n",
@@ -170,6 +242,12 @@ void run(const Arguments& arguments) {
   std::ofstream stages;
   if (!arguments.stages_csv.empty()) stages.open(arguments.stages_csv);
   if (stages.is_open()) stages << "surgery,stage,p50_ms,over_tsolve,times\n";
+  std::ofstream limits;
+  if (!arguments.limits_csv.empty()) limits.open(arguments.limits_csv);
+  if (limits.is_open()) {
+    limits << "surgery,p50_ms,active,rows,bytes,operations,limit_ms,bytes_per_s,operations_per_s\n";
+  }
+  const Speed speed = limits.is_open() ? measure_speed() : Speed();
   std::ofstream fields;
   if (!arguments.fields.empty()) fields.open(arguments.fields, std::ios::binary);
   Player player(head);
@@ -179,6 +257,7 @@ void run(const Arguments& arguments) {
     const Timed timed = play(player, observations, arguments.passes, fields);
     print(name, timed, head.t_solve_ms);
     if (stages.is_open()) write_stages(name, timed, head.t_solve_ms, stages);
+    if (limits.is_open()) write_limit(name, timed, *head.operators, speed, limits);
     for (std::size_t i = 0; csv.is_open() && i < timed.ms.size(); ++i) {
       csv << name << ',' << i + 1 << ',' << timed.ms[i] << ',' << head.t_solve_ms << ','
           << timed.active[i] << ',' << timed.steps[i] << '\n';
@@ -199,6 +278,8 @@ int main(int argc, char** argv) {
       ->check(CLI::Range(1, 100000));
   app.add_option("--csv", arguments.csv, "file for a row per update");
   app.add_option("--stages-csv", arguments.stages_csv, "file for a row per surgery and stage");
+  app.add_option("--limits-csv", arguments.limits_csv,
+                 "file for a row per surgery: bytes, operations, and their time at least");
   app.add_option("--fields", arguments.fields, "file for the estimates, see update_difference.py");
   app.add_option("surgeries", arguments.surgeries, "surgery files of the same case")->required();
   CLI11_PARSE(app, argc, argv);

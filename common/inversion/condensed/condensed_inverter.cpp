@@ -11,6 +11,7 @@
 #include "common/inversion/condensed/reason.hpp"
 #include "common/inversion/condensed/robust_weights.hpp"
 #include "common/inversion/condensed/settled_loads.hpp"
+#include "common/inversion/condensed/update_deadline.hpp"
 #include "common/inversion/contract/estimate_check.hpp"
 #include "common/linalg/openblas.hpp"
 
@@ -32,12 +33,14 @@ struct CondensedInverter::Impl {
         options(given_options),
         window(mode_window(*operators, options)),
         condensed(config.condensed),
+        deadline(config.condensed.deadline_ms),
         poisson_ratio(largest_poisson_ratio(config.material)),
         team(options.threads),
         deformation(given_locator->nodes(), given_locator->tets(), team),
         rebuild(*operators, window, team, options.region_of_interest),
         loads(operators, std::move(given_locator), window, config, options.contact, team, rebuild,
-              profile) {
+              profile),
+        source_checks(static_cast<std::size_t>(team.size())) {
     for (int slave = 0; options.contact && slave < operators->num_slaves(); ++slave) {
       const NodeIndex node = operators->slaves[static_cast<std::size_t>(slave)];
       const auto& region = options.region_of_interest;
@@ -64,14 +67,16 @@ struct CondensedInverter::Impl {
 
   DescentLimits limits(const InversionOptions& asked);
   void record();
-  Status finish(Estimate& estimate);
+  Status finish(EstimateStatus outcome, Estimate& estimate);
   Status estimate_omissions();
-  void summarise_sources(Estimate& estimate);
+  // compare: with each other.
+  void summarise_sources(bool compare, Estimate& estimate);
 
   std::shared_ptr<const CondensedOperators> operators;
   CondensedOptions options;
   ModeWindow window;
   CondensedConfig condensed;
+  UpdateDeadline deadline;
   double poisson_ratio;
   ThreadTeam team;
   UpdateProfile profile;  // of the last update
@@ -80,11 +85,11 @@ struct CondensedInverter::Impl {
   SettledLoads loads;
   Contradictions contradictions;
 
-  Stopwatch watch;                  // of the update
   std::vector<int> rebuilt_slaves;  // whose displacement is not interpolated
   std::vector<IterationRecord> history;
-  linalg::GrowingMatrix explained;  // by the data, under the broad hypothesis
-  VecX prior_variances;             // of the modes, under the same
+  linalg::GrowingMatrix explained;         // by the data, under the broad hypothesis
+  VecX prior_variances;                    // of the modes, under the same
+  std::vector<SourceCheck> source_checks;  // by member of the team
   OmissionErrors errors;
 };
 
@@ -92,7 +97,7 @@ DescentLimits CondensedInverter::Impl::limits(const InversionOptions& asked) {
   DescentLimits limits;
   limits.max_steps = condensed.max_contact_iterations;
   limits.stop = asked.stop;
-  limits.out_of_time = [this] { return watch.milliseconds() > condensed.deadline_ms; };
+  limits.out_of_time = [this] { return deadline.over(); };
   limits.on_step = [this] { record(); };
   return limits;
 }
@@ -114,11 +119,11 @@ void CondensedInverter::Impl::record() {
   const PenetrationSummary summary = summarise_penetration(descent.contact().penetration());
   entry.penetrating = summary.penetrating;
   entry.max_penetration_mm = summary.max_mm;
-  entry.elapsed_ms = watch.milliseconds();
+  entry.elapsed_ms = deadline.elapsed_ms();
   history.push_back(entry);
 }
 
-Status CondensedInverter::Impl::finish(Estimate& estimate) {
+Status CondensedInverter::Impl::finish(EstimateStatus outcome, Estimate& estimate) {
   const LoadDescent& descent = loads.descent();
   const PriorStrengths& strengths = loads.strengths();
   record();  // of the mean over the hypotheses
@@ -179,30 +184,38 @@ Status CondensedInverter::Impl::finish(Estimate& estimate) {
             [](const Hypothesis& a, const Hypothesis& b) { return a.weight > b.weight; });
   estimate.misfit_ratio = misfit.ratio;
   estimate.data_outside_region = loads.sampled().data_outside_region();
-  summarise_sources(estimate);
+  // Loads that a search had no time for may contradict any source.
+  summarise_sources(outcome != EstimateStatus::kDeadline, estimate);
   return {};
 }
 
-void CondensedInverter::Impl::summarise_sources(Estimate& estimate) {
+void CondensedInverter::Impl::summarise_sources(bool compare, Estimate& estimate) {
   const SparseData& data = loads.data();
-  estimate.sources.resize(data.sources.size());
-  for (std::size_t i = 0; i < data.sources.size(); ++i) {
-    const DataSource& source = data.sources[i];
-    SourceSummary& summary = estimate.sources[i];
-    summary = {};
-    summary.source = source.name;
-    summary.data = source.count;
-    summary.outliers = loads.weights().outliers(source.first, source.count);
-    Consistency consistency;
-    if (data.sources.size() < 2 || !loads.descent().posterior().check_source(
-                                       loads.sampled(), loads.strengths(), source, consistency)) {
-      continue;
+  const std::size_t count = data.sources.size();
+  estimate.sources.resize(count);
+  compare = compare && count > 1;
+  auto summarise = [&](int member) {
+    for (auto i = static_cast<std::size_t>(member); i < count;
+         i += static_cast<std::size_t>(team.size())) {
+      const DataSource& source = data.sources[i];
+      SourceSummary& summary = estimate.sources[i];
+      summary = {};
+      summary.source = source.name;
+      summary.data = source.count;
+      summary.outliers = loads.weights().outliers(source.first, source.count);
+      Consistency consistency;
+      if (!compare || !loads.descent().posterior().check_source(
+                          loads.sampled(), loads.strengths(), source,
+                          source_checks[static_cast<std::size_t>(member)], consistency)) {
+        continue;
+      }
+      summary.chi_square = consistency.chi_square;
+      summary.degrees_of_freedom = consistency.degrees_of_freedom;
+      summary.p_value = consistency.p_value;
+      summary.consistent = !(consistency.p_value < kInconsistent);
     }
-    summary.chi_square = consistency.chi_square;
-    summary.degrees_of_freedom = consistency.degrees_of_freedom;
-    summary.p_value = consistency.p_value;
-    summary.consistent = !(consistency.p_value < kInconsistent);
-  }
+  };
+  team.run(summarise);
 }
 
 Status CondensedInverter::Impl::estimate_omissions() {
@@ -257,7 +270,7 @@ PosteriorModes CondensedInverter::posterior() const {
 Status CondensedInverter::update(const SparseData& data, Estimate& estimate,
                                  const InversionOptions& asked) {
   Impl& impl = *impl_;
-  impl.watch = Stopwatch();
+  impl.deadline.begin(asked.spent_ms);
   impl.history.clear();
   impl.profile = {};
   if (auto status = impl.loads.take(data); !status) return status;
@@ -268,7 +281,7 @@ Status CondensedInverter::update(const SparseData& data, Estimate& estimate,
   if (!descent.z().allFinite() || !descent.contact().forces().allFinite()) {
     return fail(ErrorCode::kNotFinite, "inversion: the estimate is not finite");
   }
-  if (auto status = impl.finish(estimate); !status) {
+  if (auto status = impl.finish(*outcome, estimate); !status) {
     estimate.status = EstimateStatus::kNotRun;
     return status;
   }
@@ -282,6 +295,7 @@ Status CondensedInverter::update(const SparseData& data, Estimate& estimate,
   }
   append_contradiction(impl.contradictions.find(followed), followed, estimate.reason);
   append_warnings(estimate, impl.poisson_ratio, estimate.reason);
+  impl.deadline.end();
   return {};
 }
 

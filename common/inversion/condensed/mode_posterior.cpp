@@ -87,7 +87,6 @@ ModePosterior::ModePosterior(ModeWindow window) : window_(window) {
   solution_.setZero(most);
   scales_.setOnes(most);
   full_.setZero(most);
-  precision_.setZero(most);
   z_.setZero(window.count);
   inverse_.resize(most, most);
 }
@@ -254,24 +253,26 @@ double ModePosterior::misfit(const SampledOperators& sampled, int datum) const {
 }
 
 bool ModePosterior::check_source(const SampledOperators& sampled, const PriorStrengths& strengths,
-                                 const DataSource& source, Consistency& out) {
+                                 const DataSource& source, SourceCheck& check,
+                                 Consistency& out) const {
   const int first = sampled.first_row(source.first);
   const int count = sampled.first_row(source.first + source.count) - first;
   const Eigen::Index size = unknowns();
   const auto own = jacobian_.block(first, 0, count, size);
-  own_gram_.resize(size, size);
-  blas::gram(own, 0.0, own_gram_);
-  own_right_.noalias() = own.transpose() * jacobian_.col(size).segment(first, count);
+  check.own_gram_.resize(size, size);
+  check.precision_.resize(size);
+  blas::gram(own, 0.0, check.own_gram_);
+  check.own_right_.noalias() = own.transpose() * jacobian_.col(size).segment(first, count);
   const auto run = [&](const Hypothesis& hypothesis, Consistency& result) {
     // The check wants the prior's information; that of an absent part is as good as infinite.
     constexpr double kAbsentScale = 1e-4;
     for (int i = 0; i < size; ++i) {
       const double scale = i < common_ ? common_sd(i, hypothesis.error)
                                        : strengths.scale_of(i - common_, hypothesis.scales);
-      precision_[i] = std::pow(std::max(kAbsentScale, scale), -2);
+      check.precision_[i] = std::pow(std::max(kAbsentScale, scale), -2);
     }
-    return check_.run(gram(), right_hand_side(), own_gram_, own_right_, precision_.head(size),
-                      result);
+    return check.run(gram(), right_hand_side(), check.own_gram_, check.own_right_, check.precision_,
+                     result);
   };
   const auto& hypotheses = strengths.hypotheses();
   if (!run(hypotheses.front(), out)) return false;

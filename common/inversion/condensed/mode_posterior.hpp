@@ -55,8 +55,12 @@ class SourceCheck {
                          const Eigen::Ref<const VecX>& prior, Consistency& out);
 
  private:
+  friend class ModePosterior;
   Eigen::MatrixXd factor_, whitened_, score_covariance_, inverse_;
   VecX mean_, score_;
+  // Of ModePosterior::check_source().
+  Eigen::MatrixXd own_gram_;
+  VecX own_right_, precision_;
 };
 
 class ModePosterior {
@@ -118,9 +122,11 @@ class ModePosterior {
   // Consistency of the rows of one source with the others (SourceCheck) under the held
   // strengths. Where its p_value is below kInconsistent, p_value is the mean over the hypotheses
   // instead, or the part of that mean that reaches kInconsistent: what contradicts under one
-  // hypothesis may well agree under the next. false when it cannot be computed.
+  // hypothesis may well agree under the next. false when it cannot be computed. Threads may check
+  // several sources at once, each with a `check` of its own.
   [[nodiscard]] bool check_source(const SampledOperators& sampled, const PriorStrengths& strengths,
-                                  const DataSource& source, Consistency& out);
+                                  const DataSource& source, SourceCheck& check,
+                                  Consistency& out) const;
 
  private:
   Eigen::Map<const Eigen::MatrixXd> factor() const {
@@ -140,9 +146,6 @@ class ModePosterior {
   linalg::GrowingMatrix common_variance_;
   mutable VecX full_;
   Eigen::MatrixXd inverse_;
-  SourceCheck check_;
-  Eigen::MatrixXd own_gram_;
-  VecX own_right_, precision_;
 };
 
 }  // namespace brainshift::inversion

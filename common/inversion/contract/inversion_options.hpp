@@ -34,6 +34,8 @@ struct InversionOptions {
   // Checked once per iteration, by method condensed before every trial load. A requested stop
   // ends the inversion with the error of stopped().
   std::stop_token stop;
+  // What the update has taken before the inversion, ms: of condensed.deadline_ms.
+  double spent_ms = 0.0;
 };
 
 // The error of an inversion that ended because its caller asked for it: kNotConverged, "inversion

@@ -78,10 +78,12 @@ struct FakeInversion {
   double motion_mm = 1.0;
   std::string spoiler;  // a source with which no brain could move so
   int calls = 0;
+  std::vector<double> spent_ms;  // that each call was told
   Status operator()(int, const SparseData& data, const inversion::InversionOptions& options,
                     Estimate& estimate) {
     if (fails) return fail(ErrorCode::kNotConverged, "no");
     ++calls;
+    spent_ms.push_back(options.spent_ms);
     first = seen = data;
     const bool spoilt = std::any_of(data.sources.begin(), data.sources.end(),
                                     [this](const DataSource& s) { return s.name == spoiler; });
@@ -183,6 +185,18 @@ TEST_F(Sources, AnObservationWithAnUnusableEstimateIsTriedBesideTheNext) {
   inversion_.spoiler.clear();
   ASSERT_TRUE(run(landmarks_at(4, "ius", 3)));
   EXPECT_EQ(used(), (std::vector<std::string>{"ius", "pointer", "stereopsis"}));
+}
+
+// Registration and an inversion that was of no use count for the deadline of the update.
+TEST_F(Sources, AnInversionIsToldWhatTheUpdateHasTakenBefore) {
+  ASSERT_TRUE(run(landmarks_at(1, "pointer", 0)));
+  inversion_.spoiler = "stereopsis";
+  ASSERT_FALSE(run(landmarks_at(2, "stereopsis", 1))->usable());
+  inversion_.spent_ms.clear();
+  ASSERT_TRUE(run(landmarks_at(3, "ius", 2))->usable());
+  ASSERT_EQ(inversion_.spent_ms.size(), 2u) << "with the quarantined source, and without";
+  EXPECT_GT(inversion_.spent_ms[0], 0.0);
+  EXPECT_GT(inversion_.spent_ms[1], inversion_.spent_ms[0]);
 }
 
 TEST_F(Sources, AnObservationThatSpoilsTheNextUpdateTooIsForgotten) {

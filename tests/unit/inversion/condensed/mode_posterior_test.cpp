@@ -56,8 +56,9 @@ TEST_F(ModePosteriorTest, ASourceContradictsOnlyWhereTheMeanOverTheHypothesesSay
     PriorStrengths strengths(brain->part_columns, window, SparseData::kMaxCommonErrors, true, 0.0,
                              team);
     ASSERT_TRUE(strengths.fit(posterior.gram(), posterior.right_hand_side()));
+    SourceCheck check;
     Consistency found;
-    ASSERT_TRUE(posterior.check_source(sampled, strengths, {"pointer", half, rest}, found));
+    ASSERT_TRUE(posterior.check_source(sampled, strengths, {"pointer", half, rest}, check, found));
     double mean = 0.0;
     for (const Hypothesis& each : strengths.hypotheses()) {
       mean +=
