@@ -6,6 +6,7 @@
     run-NAME.json, latency-NAME.csv  `brainshift replay` of the surgery NAME; with another BLAS kernel
                                      NAME@KERNEL
     stages.csv                       bench_update: where the time of an update goes
+    limits.csv                       bench_update: what an update takes at least, and the machine's speed
     scenes.csv                       bench_scenes: what leaving out parts saves and costs
     peers.csv                        another code on the same mesh and load, forward
     facts.csv                        name,value: what the script measured itself
@@ -13,7 +14,7 @@
     prepare.json, prepare-100k.json  `brainshiftd prepare --json`; with edges for 100 thousand nodes
     direct-NAME.json                 bench_exactness --scenario NAME
 
-Parts that are missing stay empty; what was not measured does not hold.
+tables.md has all tables, updates.md the one of BENCHMARK.md. Parts that are missing stay empty; what was not measured does not hold.
 """
 import json
 import math
@@ -120,6 +121,8 @@ class Results:
         self.meshes, self.error_time = self._all("meshes", MESHES), self._all("error_time", ERROR_TIME)
         self.methods = summarise(self.error_time)
         self.stages = self._one("stages.csv", ("surgery", "stage", "over_tsolve"))
+        self.limits = self._one("limits.csv", ("surgery", "p50_ms", "active", "rows", "bytes", "operations", "limit_ms",
+                                               "bytes_per_s", "operations_per_s"))
         self.scenes = self._one("scenes.csv", ("scenario", "left_out", "active", "largest_mm", "difference_mm",
                                                "estimate_mm", "invert_ms", "rebuild_ms"))
         self.peers = self._one("peers.csv", ("code", "seconds", "mean_mm", "max_mm"))
@@ -219,6 +222,15 @@ def _updates(results, folder, suffix):
             median("the same", "joint-mixed", 3.0, True, "p95")]
 
 
+def _first_field(results, folder):
+    """Of an update of sag: the provisional field where there is one, else the final one."""
+    run = results.runs.get("sag-progress")
+    ms = number_at(run, "first_iterate_ms")
+    value = (number_at(run, "latency_ms", "p50") if math.isnan(ms) else ms) / number_at(run, "full_solve_ms")
+    return at_most("first field of a warm update with contact, provisional or final, p50 / t_solve", value, 0.25, "",
+                   _replay(folder, "sag-progress"))
+
+
 def _deadline(results, folder):
     """Of the updates that take longest, with a deadline of 100 ms: all of a session, the first too."""
     names = [name for name in results.runs if name.endswith("-100ms")]
@@ -315,7 +327,7 @@ def _growth(results, folder):
 def checks(results, folder):
     """folder: for the commands."""
     return [*_updates(results, folder, ""), *_updates(results, folder, "@Haswell"), _tail(results, folder),
-            _deadline(results, folder),
+            _first_field(results, folder), _deadline(results, folder),
             *(_paper(results, folder, method, bound, prior) for prior in ("case", "paper")
               for method, bound in (("paper", 3000.0), ("paper-woodbury", 700.0))),
             *_exactness(results, folder), *_preparation(results, folder), *_large(results, folder),
@@ -358,6 +370,50 @@ def _stage_table(results):
                      for stage in results.stages.values("stage")])
 
 
+def _least(row):
+    """MiB to read, millions of operations, ms: what an update takes at least."""
+    return row.number("bytes") / MIB, row.number("operations") / 1e6, row.number("limit_ms")
+
+
+def _limit_table(results):
+    return markdown(("surgery", "active", "rows of data", "p50 ms", "reads MiB", "million operations", "at least ms",
+                     "p50 of that"),
+                    [(row["surgery"], whole(row.number("active")), whole(row.number("rows")), cell(row.number("p50_ms")),
+                      *map(cell, _least(row)), cell(row.number("p50_ms") / row.number("limit_ms"))) for row in results.limits])
+
+
+def _speed(results):
+    if not results.limits.rows:
+        return "Not measured."
+    row = results.limits[0]
+    return (f"This machine reads {cell(row.number('bytes_per_s') / 1e9)} GB/s and makes {cell(row.number('operations_per_s') / 1e9)} "
+            "billion operations a second, double precision, all threads.")
+
+
+# Of BENCHMARK.md: surgery of run-NAME.json, its recording in limits.csv, what it is, most of t_solve at p50.
+UPDATES = (("sag-progress", "short", "sag, contact", 0.5), ("region", None, "the same, region of 40 mm about the tumour", 0.35),
+           ("no-contact", "no-contact", "no contact", 0.2), ("joint-sag", "joint-sag", "sag, three sources", 1.0),
+           ("distension", "distension", "swelling", 2.5), ("joint-mixed", "joint-mixed", "sag, swelling, shrinkage, three sources", 1.5))
+
+
+def update_table(results):
+    """Markdown, the table of BENCHMARK.md: updates by kind of surgery, in ms, t_solve and what they take at least."""
+    least = {row["surgery"]: row for row in results.limits}
+    rows = []
+    for name, recording, what, bound in UPDATES:
+        run = results.runs.get(name, {})
+        numbers = [number_at(run, "full_solve_ms"), number_at(run, "cold_ms"),
+                   *(number_at(run, "latency_ms", one) for one in ("p50", "p95", "p99")), number_at(run, "first_iterate_ms")]
+        ratio, other = results.over_tsolve(name), results.over_tsolve(name + "@Haswell")
+        of_t_solve = cell(ratio, 2) if ratio <= bound else f"**{cell(ratio, 2)}**"
+        row = least.get(recording)
+        limits = map(cell, _least(row)) if row is not None else ("-",) * 3
+        rows.append((what, str(results.active(name)), *map(cell, numbers), of_t_solve, cell(other, 2), str(bound), *limits))
+    return "\n".join([f"Processor: {results.machine}. {_speed(results)}", "",
+                      *markdown(("surgery", "slaves that press", "t_solve ms", "first ms", "p50 ms", "p95 ms", "p99 ms", "provisional ms",
+                                 "p50 of t_solve", "kernel Haswell", "bound", "reads MiB", "million operations", "at least ms"), rows)]) + "\n"
+
+
 def _scene_table(results):
     numbers = ("largest_mm", "difference_mm", "estimate_mm", "invert_ms", "rebuild_ms")
     return markdown(("surgery", "left out", "active", "largest displacement mm", "change mm", "estimate of it mm",
@@ -396,12 +452,16 @@ def _method_table(results):
 
 def tables(results, all_checks):
     """Markdown: machine and commit, checks, latencies, stages, scenes, meshes, methods."""
-    lines = [f"Processor: {results.machine}."]
+    lines = ["# Benchmark: all tables", "", "[BENCHMARK.md](../../BENCHMARK.md) says how they were measured and what they come to.", "",
+             f"Processor: {results.machine}."]
     for heading, above, table in (
             ("Checks", (), _check_table(all_checks)),
             ("Latency through daemon and client, loopback", (), _latency_table(results)),
             ("Where the time of an update goes",
              ("Medians in units of t_solve, in one process without messages.", ""), _stage_table(results)),
+            ("What an update takes at least",
+             (_speed(results) + " One linear model of the last active set and one field, each number read once, each operation made once at that "
+              "speed; an update makes several. Medians in one process without messages.", ""), _limit_table(results)),
             ("What leaving out parts of a scene saves and costs", (), _scene_table(results)),
             *([("Another code on the same mesh, forces and contact, forward",
                ("Sag of patient 1, about 18 thousand nodes; a row for the part of the forward model here that waits for no load, and "
@@ -409,9 +469,9 @@ def tables(results, all_checks):
             ("Growth with the mesh", (), _mesh_table(results)),
             ("Methods", ("Times are over n repetitions, errors over those repetitions that all methods of a mesh "
                          "and scenario have.", ""), _method_table(results))):
-        lines += ["", "### " + heading, "", *above, *table]
+        lines += ["", "## " + heading, "", *above, *table]
     if results.left_out:
-        lines += ["", "### Left out", "", *("- " + line for line in results.left_out)]
+        lines += ["", "## Left out", "", *("- " + line for line in results.left_out)]
     return "\n".join(lines) + "\n"
 
 
@@ -445,6 +505,7 @@ def main(arguments):
         return True
     found = checks(results, options.dir)
     write_file(folder / "tables.md", tables(results, found))
+    write_file(folder / "updates.md", update_table(results))
     write_file(folder / "summary.json", summary_json(found, results.left_out))
     print_checks(found, results.left_out)
     return every_check_holds(found)

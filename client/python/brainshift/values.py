@@ -319,7 +319,7 @@ class Update:
     observation_sequence: int
     method: str
     boundary: str
-    final: bool  # False: an iterate
+    final: bool  # False: an iterate, a provisional field
     status: str  # "converged", "iteration_limit", "deadline", "iterating", "not_run", "failed"
     reason: str
     error_code: str  # set when status is "failed"

@@ -22,6 +22,8 @@ namespace {
 constexpr int kReservedData = 1000;
 // Loads of one update that the history has room for before it grows: eleven descents.
 constexpr int kReservedDescents = 11;
+// An update that has taken less shows no provisional field, ms: nobody sees the difference.
+constexpr double kProvisionalAfter_ms = 100.0;
 
 }  // namespace
 
@@ -67,6 +69,10 @@ struct CondensedInverter::Impl {
 
   DescentLimits limits(const InversionOptions& asked);
   void record();
+  // The field of a mean that a closer one will follow, to whoever asked, once in an update.
+  Status show_provisional(const InversionOptions& asked);
+  // Displacement and standard deviation of the last mean.
+  void rebuild_field(const ModePosterior::Misfit& misfit, Estimate& estimate);
   Status finish(EstimateStatus outcome, Estimate& estimate);
   Status estimate_omissions();
   // compare: with each other.
@@ -87,6 +93,8 @@ struct CondensedInverter::Impl {
 
   std::vector<int> rebuilt_slaves;  // whose displacement is not interpolated
   std::vector<IterationRecord> history;
+  Estimate provisional;
+  bool shown = false;                      // the provisional estimate of this update
   linalg::GrowingMatrix explained;         // by the data, under the broad hypothesis
   VecX prior_variances;                    // of the modes, under the same
   std::vector<SourceCheck> source_checks;  // by member of the team
@@ -123,18 +131,49 @@ void CondensedInverter::Impl::record() {
   history.push_back(entry);
 }
 
-Status CondensedInverter::Impl::finish(EstimateStatus outcome, Estimate& estimate) {
+void CondensedInverter::Impl::rebuild_field(const ModePosterior::Misfit& misfit,
+                                            Estimate& estimate) {
   const LoadDescent& descent = loads.descent();
-  const PriorStrengths& strengths = loads.strengths();
-  record();  // of the mean over the hypotheses
-  const Stopwatch rebuilding;
-  const auto misfit = loads.descent().posterior().misfit();
   if (options.uncertainty) {
     const StageClock clock(profile, UpdateStage::kDeviation);
     rebuild.standard_deviation(team, descent.reduction(), descent.covariance_factor(),
                                loads.remainder_variances(), estimate.sd_mm);
     // Where data lie farther off than chance explains, so may the estimate (Birge 1932).
     if (misfit.ratio > misfit.by_chance) estimate.sd_mm *= misfit.ratio;
+  } else {
+    estimate.sd_mm.resize(0);
+  }
+  const StageClock clock(profile, UpdateStage::kField);
+  rebuild.displacement(team, descent.z(), descent.contact(), estimate.displacement);
+}
+
+Status CondensedInverter::Impl::show_provisional(const InversionOptions& asked) {
+  if (shown || asked.spent_ms + deadline.elapsed_ms() < kProvisionalAfter_ms) return {};
+  shown = true;
+  if (auto status = loads.spread(); !status) return status;
+  rebuild_field(loads.descent().posterior().misfit(), provisional);
+  const IterationRecord& last = history.back();
+  provisional.status = EstimateStatus::kIterating;
+  provisional.reason = "provisional: the search goes on";
+  provisional.history = history;
+  provisional.misfit_mm = last.misfit_mm;
+  provisional.initial_misfit_mm = mean_std_of_norms(loads.data().displacements);
+  provisional.contact = {loads.descent().contact().size(), last.penetrating,
+                         last.max_penetration_mm, static_cast<int>(history.size())};
+  provisional.prior_scales = loads.strengths().mean();
+  asked.on_iterate(provisional);
+  return {};
+}
+
+Status CondensedInverter::Impl::finish(EstimateStatus outcome, Estimate& estimate) {
+  const LoadDescent& descent = loads.descent();
+  const PriorStrengths& strengths = loads.strengths();
+  record();  // of the mean over the hypotheses
+  const Stopwatch rebuilding;
+  const auto misfit = loads.descent().posterior().misfit();
+  rebuild_field(misfit, estimate);
+  if (options.uncertainty) {
+    const StageClock clock(profile, UpdateStage::kDeviation);
     if (!loads.strengths().explained_broadly(explained, prior_variances)) {
       return fail(ErrorCode::kNotFinite, "inversion: the broad hypothesis is not finite");
     }
@@ -143,15 +182,10 @@ Status CondensedInverter::Impl::finish(EstimateStatus outcome, Estimate& estimat
     for (const NodeIndex node : operators->region) sum += estimate.known[node];
     estimate.region_known = sum / static_cast<double>(operators->region.size());
   } else {
-    estimate.sd_mm.resize(0);
     estimate.known.resize(0);
     estimate.region_known = std::numeric_limits<double>::quiet_NaN();
   }
   const ContactAtLoads& contact = descent.contact();
-  {
-    const StageClock clock(profile, UpdateStage::kField);
-    rebuild.displacement(team, descent.z(), contact, estimate.displacement);
-  }
   const StageClock checking(profile, UpdateStage::kCheck);
   if (auto status = check_equilibrium(*operators, rebuilt_slaves, contact.penetration(),
                                       estimate.displacement);
@@ -275,7 +309,10 @@ Status CondensedInverter::update(const SparseData& data, Estimate& estimate,
   impl.profile = {};
   if (auto status = impl.loads.take(data); !status) return status;
   impl.contradictions.reserve(data.size());
-  const auto outcome = impl.loads.settle(asked, impl.limits(asked));
+  impl.shown = false;
+  std::function<Status()> on_answer;
+  if (asked.on_iterate) on_answer = [&impl, &asked] { return impl.show_provisional(asked); };
+  const auto outcome = impl.loads.settle(asked, impl.limits(asked), on_answer);
   if (!outcome) return tl::unexpected(outcome.error());
   const LoadDescent& descent = impl.loads.descent();
   if (!descent.z().allFinite() || !descent.contact().forces().allFinite()) {

@@ -77,15 +77,17 @@ Status SettledLoads::take(const SparseData& data) {
 }
 
 Result<EstimateStatus> SettledLoads::settle(const InversionOptions& asked,
-                                            const DescentLimits& limits) {
+                                            const DescentLimits& limits,
+                                            const std::function<Status()>& on_answer) {
   Round round;
+  round.on_answer = &on_answer;
   if (auto status = begin(limits, round.outcome); !status) return tl::unexpected(status.error());
   for (bool last = false; !last; ++round.number) {
     const auto gone = go_round(asked, limits, round);
     if (!gone) return tl::unexpected(gone.error());
     last = *gone;
   }
-  if (auto status = descent_.spread(strengths_); !status) return tl::unexpected(status.error());
+  if (auto status = spread(); !status) return tl::unexpected(status.error());
   return round.outcome;
 }
 
@@ -112,6 +114,9 @@ Result<bool> SettledLoads::go_round(const InversionOptions& asked, const Descent
   if (!*averaged || (round.depth != Depth::kFine && limits.over())) {
     round.outcome = EstimateStatus::kDeadline;
     return true;
+  }
+  if (round.depth != Depth::kFine && *round.on_answer) {
+    if (auto status = (*round.on_answer)(); !status) return tl::unexpected(status.error());
   }
   const auto followed = follow(asked.moving);
   if (!followed) return tl::unexpected(followed.error());

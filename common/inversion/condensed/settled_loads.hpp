@@ -11,6 +11,7 @@
 // one more descent to the end, and the outcome is kIterationLimit.
 #pragma once
 
+#include <functional>
 #include <memory>
 #include <vector>
 
@@ -43,7 +44,12 @@ class SettledLoads {
   // SampledOperators::locate.
   Status take(const SparseData& data);
   // Settles all four. Errors of LoadDescent and PriorStrengths, and of moving data that do not fit.
-  Result<EstimateStatus> settle(const InversionOptions& asked, const DescentLimits& limits);
+  // on_answer: called after each mean over the hypotheses that a closer one will follow; from there
+  // spread() may be called, which changes no later number.
+  Result<EstimateStatus> settle(const InversionOptions& asked, const DescentLimits& limits,
+                                const std::function<Status()>& on_answer = {});
+  // Covariance of the last mean.
+  Status spread() { return descent_.spread(strengths_); }
 
   // The data where they are now.
   const SparseData& data() const { return *data_; }
@@ -65,6 +71,7 @@ class SettledLoads {
     int number = 0;
     Depth depth = Depth::kRough;                          // of the last descent
     EstimateStatus outcome = EstimateStatus::kConverged;  // of the last descent; in the end, of all
+    const std::function<Status()>* on_answer = nullptr;
   };
 
   Status begin(const DescentLimits& limits, EstimateStatus& outcome);

@@ -26,7 +26,8 @@ struct MovingData {
 
 struct InversionOptions {
   // Called after every iteration with the iterate so far (status kIterating); may be empty. Method
-  // condensed has no field before the last iteration and does not call it.
+  // condensed calls it once at most, in an update that has taken a tenth of a second and is not
+  // near its end, with a provisional field and its standard deviation.
   std::function<void(const Estimate&)> on_iterate;
   // Data that follow the deformation. Method condensed takes them; the other methods reject data
   // along a direction and do not look at this. Null: no datum moves.

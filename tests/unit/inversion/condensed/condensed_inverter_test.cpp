@@ -396,6 +396,29 @@ TEST_F(Condensed, DeadlineReturnsTheBestIterateAndSaysSo) {
   EXPECT_TRUE(estimate.displacement.allFinite());
 }
 
+TEST_P(Condensed, ALongUpdateShowsOneProvisionalFieldAndEndsWithTheSameBits) {
+  const SparseData data = sagging_data(GetParam(), 0.3);
+  Estimate alone, after;
+  ASSERT_TRUE(Condensed::inverter(GetParam()).update(data, alone));
+  std::vector<Estimate> shown;
+  InversionOptions asked;
+  asked.on_iterate = [&shown](const Estimate& iterate) { shown.push_back(iterate); };
+  asked.spent_ms = 1000.0;  // before the inversion: registration of many points
+  ASSERT_TRUE(Condensed::inverter(GetParam()).update(data, after, asked));
+  EXPECT_TRUE(after.displacement == alone.displacement);
+  EXPECT_TRUE(after.sd_mm == alone.sd_mm);
+  EXPECT_TRUE(after.known == alone.known);
+  ASSERT_EQ(shown.size(), 1u);
+  const Estimate& early = shown.front();
+  EXPECT_EQ(early.status, EstimateStatus::kIterating);
+  EXPECT_FALSE(early.quality.usable());
+  EXPECT_LT(early.history.size(), after.history.size());
+  ASSERT_EQ(early.sd_mm.size(), after.sd_mm.size());
+  EXPECT_GT(early.sd_mm.minCoeff(), 0.0);
+  const VecX apart = (early.displacement - after.displacement).colwise().norm().transpose();
+  EXPECT_LT(apart.cwiseQuotient(early.sd_mm).maxCoeff(), 1.0);
+}
+
 // A stop is not a deadline, whatever the deadline is: no estimate, and the reason says "stopped".
 TEST_P(Condensed, AStopBeforeTheFirstSetEndsTheUpdateAtOnce) {
   CaseConfig hurried = config();
