@@ -9,9 +9,10 @@
 //   reserve = (end of the update - when a search was first told) + longest time between two
 //             questions                                                        of this session,
 //
-// of the last update that was told so, or of those before, each of which counts kFades of the next;
-// before one was, twice what the last update took after the last question; in the first update
-// kFirstPart of the deadline. Never more than kMostPart of it: a search must begin.
+// of the last update that was told so, or kFades of what was reserved before; before one was, twice
+// what the last update took after the last question; in the first update kFirstPart of the
+// deadline. Never more than kMostPart of it: a search must begin. An update that was stopped on its
+// way, by a debugger or by a computer that slept, counts for a while and no longer.
 #pragma once
 
 #include <algorithm>
@@ -56,11 +57,11 @@ class UpdateDeadline {
   void end() {
     const double ended = elapsed_ms();
     if (told_ms_ >= 0.0) {
-      const double needed = ended - told_ms_ + gap_ms_;
+      const double needed = std::min(ended - told_ms_ + gap_ms_, kMostPart * deadline_ms_);
       reserve_ms_ = learned_ ? std::max(needed, kFades * reserve_ms_) : needed;
       learned_ = true;
-    } else if (!learned_) {
-      reserve_ms_ = 2.0 * (ended - asked_ms_ + gap_ms_);
+    } else {
+      reserve_ms_ = learned_ ? kFades * reserve_ms_ : 2.0 * (ended - asked_ms_ + gap_ms_);
     }
   }
   double reserve_ms() const { return reserve_ms_; }

@@ -62,6 +62,16 @@ TEST(UpdateDeadline, AnEndLongerThanTheDeadlineLeavesASearchAPartOfIt) {
   EXPECT_NEAR(play(deadline, now, {1e6, 1.0, 500.0}), 520.0, 1.5);
 }
 
+TEST(UpdateDeadline, AMinuteOfSleepIsForgotten) {
+  double now = 0.0;
+  UpdateDeadline deadline(3000.0, [&now] { return now; });
+  play(deadline, now, {60.0, 10.0, 40.0});
+  play(deadline, now, {70000.0, 60000.0, 40.0});
+  EXPECT_LT(play(deadline, now, {2000.0, 10.0, 40.0}), 700.0) << "cut short";
+  for (int i = 0; i < 60; ++i) play(deadline, now, {60.0, 10.0, 40.0});
+  EXPECT_EQ(play(deadline, now, {2800.0, 10.0, 40.0}), 2840.0);
+}
+
 TEST(UpdateDeadline, TellsEveryThreadThatAsks) {
   UpdateDeadline deadline(1e-9);
   deadline.begin();
