@@ -79,7 +79,8 @@ daemon_rss() { awk '/^VmRSS:/ { print 1024 * $2 }' "/proc/$daemon/status"; }
 replay() {  # SURGERY NAME CYCLES
   "$bin/brainshift" replay "$out/$1.surgery" --endpoint "$endpoint" --boundary contact \
     --method condensed --repeat "${3:-1}" --report "$out/run-$2.json" \
-    --latency-csv "$out/latency-$2.csv"
+    --latency-csv "$out/latency-$2.csv" || return
+  sed -i "s|\"$PWD/|\"|" "$out/run-$2.json"  # files by their place in the repository
   rm -rf "$out/run-$2" "$out"/run-"$2"*.vtu
 }
 
