@@ -76,11 +76,25 @@ note_machine() {
 # Resident memory of the daemon, bytes.
 daemon_rss() { awk '/^VmRSS:/ { print 1024 * $2 }' "/proc/$daemon/status"; }
 
+# A report without the course of the surgery, whose latencies are in a file of their own; files by their place in the repository.
+shorten() {
+  /usr/bin/python3 - "$1" "$PWD/" <<'END'
+import json, sys
+path, root = sys.argv[1:]
+reports = json.loads(open(path).read().replace('"' + root, '"'))
+for report in reports:
+    report.pop("course", None)
+with open(path, "w") as out:
+    json.dump(reports, out, indent=2)
+    out.write("\n")
+END
+}
+
 replay() {  # SURGERY NAME CYCLES
   "$bin/brainshift" replay "$out/$1.surgery" --endpoint "$endpoint" --boundary contact \
     --method condensed --repeat "${3:-1}" --report "$out/run-$2.json" \
     --latency-csv "$out/latency-$2.csv" || return
-  sed -i "s|\"$PWD/|\"|" "$out/run-$2.json"  # files by their place in the repository
+  shorten "$out/run-$2.json" || return
   rm -rf "$out/run-$2" "$out"/run-"$2"*.vtu
 }
 

@@ -390,10 +390,20 @@ TEST_F(Condensed, DeadlineReturnsTheBestIterateAndSaysSo) {
   hurried.condensed.deadline_ms = 1e-9;
   Estimate estimate;
   auto inverter = Condensed::inverter(Boundary::kContact, {}, hurried);
-  ASSERT_TRUE(inverter.update(sagging_data(Boundary::kContact, 0.3), estimate));
+  SparseData data = sagging_data(Boundary::kContact, 0.3);
+  const int half = data.size() / 2;
+  data.sources = {{"ius", 0, half}, {"pointer", half, data.size() - half}};
+  data.displacements.leftCols(half).array() += 5.0;  // which contradicts the others
+  ASSERT_TRUE(inverter.update(data, estimate));
   EXPECT_EQ(estimate.status, EstimateStatus::kDeadline);
   EXPECT_THAT(estimate.reason, HasSubstr("best iterate"));
   EXPECT_TRUE(estimate.displacement.allFinite());
+  ASSERT_EQ(estimate.sources.size(), 2u);
+  for (const SourceSummary& source : estimate.sources) {
+    EXPECT_TRUE(std::isnan(source.p_value) && source.consistent) << "the search did not end";
+  }
+  ASSERT_TRUE(Condensed::inverter(Boundary::kContact).update(data, estimate));
+  EXPECT_FALSE(estimate.sources.front().consistent) << "with time it says so";
 }
 
 TEST_P(Condensed, ALongUpdateShowsOneProvisionalFieldAndEndsWithTheSameBits) {
