@@ -207,14 +207,16 @@ Result<RegisteredObservation> from_surface(const CorticalSurface& body,
   return registered;
 }
 
-// Pairs in groups about kMostLandmarks of them that are spread over all, each the mean of its
-// group: what a displacement that is affine over a group says of it, with as much weight.
+// Groups of neighbouring pairs, each the mean of its group: what a displacement that is affine over
+// a group says of it.
 struct GroupedPairs {
   Points undeformed, displacements;
   VecX count;  // of each group
 };
-GroupedPairs grouped(const Points& undeformed, const Points& displacements) {
-  const auto centres = geometry::spread_nodes(undeformed, kMostLandmarks);
+
+// About these pairs.
+GroupedPairs grouped(const Points& undeformed, const Points& displacements,
+                     const std::vector<NodeIndex>& centres) {
   const auto groups = static_cast<Eigen::Index>(centres.size());
   const Points places = undeformed(Eigen::all, centres);
   GroupedPairs result{Points::Zero(3, groups), Points::Zero(3, groups), VecX::Zero(groups)};
@@ -237,6 +239,18 @@ GroupedPairs grouped(const Points& undeformed, const Points& displacements) {
           result.count.head(kept)};
 }
 
+// The first pair, and each that is farther than kOneFeature_mm from those before it.
+std::vector<NodeIndex> features(const Points& undeformed) {
+  std::vector<NodeIndex> found;
+  for (Eigen::Index i = 0; i < undeformed.cols(); ++i) {
+    const auto near = [&](NodeIndex other) {
+      return (undeformed.col(other) - undeformed.col(i)).norm() <= kOneFeature_mm;
+    };
+    if (std::none_of(found.begin(), found.end(), near)) found.push_back(static_cast<NodeIndex>(i));
+  }
+  return found;
+}
+
 Result<RegisteredObservation> from_landmarks(const LandmarkPairs& pairs, const CaseConfig& config,
                                              Method method) {
   if (pairs.undeformed.cols() != pairs.deformed.cols()) {
@@ -253,7 +267,14 @@ Result<RegisteredObservation> from_landmarks(const LandmarkPairs& pairs, const C
   registered.data.sd_mm =
       VecX::Constant(pairs.undeformed.cols(), datum_sd_mm(pairs.sd_mm, config.inversion, method));
   if (method == Method::kCondensed && pairs.undeformed.cols() > kMostLandmarks) {
-    const GroupedPairs groups = grouped(pairs.undeformed, registered.data.displacements);
+    GroupedPairs groups =
+        grouped(pairs.undeformed, registered.data.displacements, features(pairs.undeformed));
+    if (groups.undeformed.cols() > kMostLandmarks) {
+      groups = grouped(groups.undeformed, groups.displacements,
+                       geometry::spread_nodes(groups.undeformed, kMostLandmarks));
+    } else {
+      groups.count.setOnes();
+    }
     registered.data.positions = groups.undeformed;
     registered.data.displacements = groups.displacements;
     registered.data.sd_mm = registered.data.sd_mm[0] * groups.count.cwiseSqrt().cwiseInverse();

@@ -11,7 +11,8 @@
 //                               The pose is where they start; it tells gross outliers too
 //                    rigid      displacements by the pose, with its errors (other methods)
 //   LandmarkPairs    displacement = deformed - undeformed, all pairs; of more than kMostLandmarks
-//                    (method condensed) the means of so many groups of neighbours, with the
+//                    (method condensed) those within kOneFeature_mm count as one, their mean,
+//                    since they share their error; then the means of so many groups, with the
 //                    standard deviation of a mean. sensing.landmark_pose_sd_mm and _deg are a
 //                    common error: misregistration of the image during surgery
 //   CorticalSurface  sensing.surface_points of its vertices over the craniotomy (of at most
@@ -51,6 +52,8 @@ namespace brainshift::pipeline {
 
 // As many as guide an estimate for a surface (registration/surface_distances.hpp).
 inline constexpr int kMostLandmarks = 300;
+// Twice the resolution at which a feature is found in an image of ultrasound.
+inline constexpr double kOneFeature_mm = 2.0;
 // More do not make an alignment better: what neighbouring points are off by alike remains.
 inline constexpr int kMostAligned = 5000;
 // Of a surface, of which a part alone lies over the craniotomy.

@@ -146,7 +146,10 @@ TEST_F(PipelineTest, ManyLandmarksWeighAsMuchInGroups) {
   Mat3 strain;
   for (double& entry : strain.reshaped()) entry = 0.02 * random.normal();
   LandmarkPairs pairs{Points(3, 900), Points(3, 900), 0.1};
-  for (double& x : pairs.undeformed.reshaped()) x = 100.0 * random.uniform();
+  for (int i = 0; i < 900; ++i) {  // no two within kOneFeature_mm
+    pairs.undeformed.col(i) = 10.0 * Vec3(i % 10, (i / 10) % 10, i / 100);
+    for (double& x : pairs.undeformed.col(i)) x += 7.0 * random.uniform();
+  }
   pairs.deformed = pairs.undeformed + strain * pairs.undeformed;
   Observation observation = landmarks(1);
   observation.body = pairs;
@@ -154,13 +157,24 @@ TEST_F(PipelineTest, ManyLandmarksWeighAsMuchInGroups) {
   ASSERT_EQ(seen_->size(), kMostLandmarks);
   EXPECT_NEAR(seen_->sd_mm.cwiseAbs2().cwiseInverse().sum(), 900 / (0.25 * 0.25), 1e-6);
   EXPECT_TRUE(seen_->displacements.isApprox(strain * seen_->positions, 1e-12));
-  // Of one place there is one group.
-  pairs.undeformed.colwise() = Vec3(1, 2, 3);
-  pairs.deformed.colwise() = Vec3(2, 2, 3);
+}
+
+TEST_F(PipelineTest, ManyLandmarksOfOneFeatureWeighAsOne) {
+  method_ = Method::kCondensed;
+  config_.inversion.sigma_mm = 0.25;
+  Random random(4);
+  LandmarkPairs pairs{Points(3, 900), Points(3, 900), 0.1};
+  for (int i = 0; i < 900; ++i) {
+    pairs.undeformed.col(i) = 10.0 * Vec3(i % 10, (i / 10) % 10, 0);
+    for (double& x : pairs.undeformed.col(i)) x += 0.5 * random.uniform();
+  }
+  pairs.deformed = pairs.undeformed.colwise() + Vec3(1, 0, 0);
+  Observation observation = landmarks(1);
   observation.body = pairs;
   ASSERT_TRUE(run(observation).has_value());
-  ASSERT_EQ(seen_->size(), 1);
-  EXPECT_TRUE(seen_->displacements.isApprox(Points(Vec3(1, 0, 0))));
+  ASSERT_EQ(seen_->size(), 100);
+  EXPECT_EQ(seen_->sd_mm, VecX(VecX::Constant(100, 0.25)));
+  EXPECT_TRUE(seen_->displacements.isApprox(Points(Vec3(1, 0, 0).replicate(1, 100))));
 }
 
 TEST_F(PipelineTest, AShiftedTumourBoundaryGivesBackItsShift) {
