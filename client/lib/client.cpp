@@ -46,6 +46,7 @@ struct Client::Impl {
   UpdateQueue updates{kMaxQueuedUpdates};
   FieldAssembly assembly;
   LatestUsable latest_usable;
+  SessionKey own;  // the session that this client started
   SessionWatch watch;
   int mesh_nodes = 0;  // of the model that the viewer draws with; 0: not known
   std::optional<Subscription> subscription;
@@ -257,6 +258,7 @@ Result<SessionInfo> Client::start_session(const SessionRequest& request) {
                 MessageType::kStartSessionReply, impl_->options.session_timeout)
       .and_then(wire::decode_session_info)
       .map([this](SessionInfo info) {
+        impl_->own = info.key();
         impl_->latest_usable.begin(info.key());
         impl_->watch.expect_model(info.model_id);
         impl_->mesh_nodes = info.nodes;
@@ -303,10 +305,25 @@ Status Client::subscribe(std::uint32_t window, const FieldChoice& choice) {
 
 Result<ObservationReceipt> Client::submit(const Observation& observation) {
   Observation named = observation;
-  if (named.session == SessionKey{}) named.session = impl_->latest_usable.session();
+  if (named.session == SessionKey{}) {
+    if (auto status = session_status(); !status) return tl::unexpected(status.error());
+    named.session = impl_->own == SessionKey{} ? impl_->latest_usable.session() : impl_->own;
+  }
   return impl_
       ->request(MessageType::kObservation, wire::encode(named), MessageType::kObservationReply)
       .and_then(wire::decode_observation_receipt);
+}
+
+Status Client::session_status() const {
+  const SessionKey& own = impl_->own;
+  const SessionKey& runs = impl_->latest_usable.session();
+  if (own == SessionKey{} || runs == own || runs == SessionKey{}) return {};
+  const std::string why = runs.boot_id != own.boot_id ? "the daemon has been restarted"
+                          : runs.session_id == 0      ? "none runs now"
+                                                      : "another client has started session " +
+                                                       std::to_string(runs.session_id);
+  return fail(ErrorCode::kUnavailable,
+              "session " + std::to_string(own.session_id) + " has ended: " + why);
 }
 
 Result<UpdateMessage> Client::next_update(milliseconds timeout) {

@@ -81,7 +81,8 @@
 //
 // Sessions. A session belongs to the client that started it until that client disconnects. Another
 // one ends it only with SessionRequest::takeover. submit() names the session for the caller: the
-// one that this client started or, when it only subscribed, the one that runs.
+// one that this client started, until it starts another, or, when it only subscribed, the one that
+// runs. Of a session that another client has ended submit() sends nothing: session_status().
 #pragma once
 
 #include <chrono>
@@ -152,8 +153,13 @@ class Client {
   // Hands an observation over. Returns when the daemon has accepted it, not when it has been
   // inverted. The receipt tells whether it replaced an older one of the same source that still
   // waited. kInvalidArgument and others: the daemon rejects the observation and names the field.
-  // Without a session in it, it is for this client's (see Sessions).
+  // Without a session in it, it is for this client's (see Sessions); kUnavailable when that has
+  // ended.
   Result<ObservationReceipt> submit(const Observation& observation);
+
+  // kUnavailable when the session that this client started has ended, as far as it has been told:
+  // subscribers are told at once. Ok for a client that has started none.
+  Status session_status() const;
 
   // The next pushed update in order of arrival: an iterate, a final update (Update::final) of any
   // quality, or the error that an observation ended in. Only Update::usable() ones may be shown.

@@ -108,6 +108,19 @@ def test_updates_that_wait_end_with_their_session(daemon, script, client):
     assert client.latest_usable.session.session_id == 2
 
 
+def test_who_started_a_session_observes_for_no_other(daemon, script, client):
+    script.replies[MessageType.START_SESSION_REQUEST] = (
+        MessageType.START_SESSION_REPLY, pb.StartSessionReply(boot_id=7, session_id=1, model_id="model").SerializeToString())
+    script.replies[MessageType.OBSERVATION] = (MessageType.OBSERVATION_REPLY, pb.ObservationReply().SerializeToString())
+    pairs = brainshift.LandmarkPairs(np.ones((3, 3)), np.ones((3, 3)), 0.1)
+    client.start_session("case")
+    client.submit(pairs, "ius")
+    client._latest.follow(brainshift.SessionKey(7, 2, "model"))
+    with pytest.raises(brainshift.Error, match="session 1 has ended: another client has started session 2") as caught:
+        client.submit(pairs, "ius")
+    assert caught.value.code == "unavailable"
+
+
 def test_a_field_of_another_mesh_is_refused_by_next_update_alone(daemon, script, client):
     script.replies[MessageType.START_SESSION_REQUEST] = (
         MessageType.START_SESSION_REPLY,

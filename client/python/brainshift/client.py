@@ -78,6 +78,7 @@ class Client:
         self._mesh_nodes = 0  # of the model that the viewer draws with; 0: not known
         self._sequences: dict[str, int] = {}
         self._case_id = ""
+        self._own = SessionKey()  # of the session that this client started
 
     def close(self) -> None:
         self._socket.close(linger=0)
@@ -109,7 +110,7 @@ class Client:
         payload = codec.start_session(case_id, method, boundary, publish_iterates, takeover, recorded_clock)
         session = self._ask(MessageType.START_SESSION_REQUEST, payload, MessageType.START_SESSION_REPLY,
                             codec.session, timeout_s)
-        self._case_id = case_id
+        self._case_id, self._own = case_id, session.key
         self._sequences.clear()
         self._latest.begin(session.key)
         self._watch.model_id, self._mesh_nodes = session.key.model_id, session.nodes
@@ -138,15 +139,26 @@ class Client:
         return self.submit_observation(observation)
 
     def submit_observation(self, observation: Observation) -> Receipt:
-        """The same for one that is complete, e.g. of a recording; without a session it is for that
-        of this client, or for the one that it watches."""
+        """The same for one that is complete, e.g. of a recording; without a session it is for the one
+        that this client started, or for the one that it watches if it started none. Error
+        "unavailable": the session that it started has ended, by what it has been told; nothing is sent."""
         if observation.session == SessionKey():
-            observation = dataclasses.replace(observation, session=self._latest.session)
+            self._check_own_session()
+            session = self._latest.session if self._own == SessionKey() else self._own
+            observation = dataclasses.replace(observation, session=session)
         receipt = self._ask(MessageType.OBSERVATION, codec.observation(observation), MessageType.OBSERVATION_REPLY,
                             codec.receipt)
         known = self._sequences.get(observation.source, 0)
         self._sequences[observation.source] = max(known, observation.sequence)
         return receipt
+
+    def _check_own_session(self) -> None:
+        own, runs = self._own, self._latest.session
+        if own == SessionKey() or runs in (own, SessionKey()):
+            return
+        why = ("the daemon has been restarted" if runs.boot_id != own.boot_id else
+               f"another client has started session {runs.session_id}" if runs.session_id else "none runs now")
+        raise Error("unavailable", f"session {own.session_id} has ended: {why}")
 
     def subscribe(self, window: int = 1, choice: Choice = Choice()) -> SessionState:
         """From now on the daemon pushes updates to this client; the newest usable one comes at once.

@@ -65,12 +65,13 @@ def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("surgery")
     parser.add_argument("--endpoint", default="tcp://127.0.0.1:5555")
+    parser.add_argument("--takeover", action="store_true", help="end a session that another connected client started")
     parser.add_argument("--picture", help="PNG file of the last usable field")
     parser.add_argument("--mesh", help="mesh file with the field, in any format that meshio writes")
     arguments = parser.parse_args()
     try:
         with brainshift.Surgery(arguments.surgery) as surgery, brainshift.connect(arguments.endpoint) as client:
-            client.start_session(takeover=True, recorded_clock=True)
+            client.start_session(takeover=arguments.takeover, recorded_clock=True)
             model = client.model()
             update = play(client, surgery)
     except brainshift.Error as error:

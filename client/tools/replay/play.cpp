@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "client/tools/replay/play.hpp"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 
 #include "client/lib/client.hpp"
@@ -12,6 +14,9 @@ namespace {
 
 using Clock = std::chrono::steady_clock;
 using std::chrono::milliseconds;
+
+// Between two looks whether the session still runs.
+constexpr milliseconds kBetweenLooks{500};
 
 double ms_between(Clock::time_point from, Clock::time_point to) {
   return std::chrono::duration<double, std::milli>(to - from).count();
@@ -62,6 +67,7 @@ class Player {
       const bool silent = !observation.latency_ms && !observation.error && !observation.superseded;
       if (silent && lost_) observation.error = lost_;
     }
+    session_.lost = lost_;
     report(progress_, "replay", 1.0);
     return std::move(session_);
   }
@@ -131,7 +137,7 @@ class Player {
   void receive_until(Done done, Clock::time_point deadline) {
     while (!done() && !lost_) {
       const auto asked = Clock::now();
-      const milliseconds left = time_left(deadline);
+      const milliseconds left = std::min(time_left(deadline), kBetweenLooks);
       if (left.count() == 0) return;
       auto message = link_.next_update(left);
       const auto now = Clock::now();
@@ -143,6 +149,8 @@ class Player {
       } else if (now - asked < left / 2) {
         lost_ = message.error();  // unavailable well before the time was up: the daemon is gone
       }
+      if (const Status session = link_.session_status(); !session && !lost_)
+        lost_ = session.error();
     }
   }
 
@@ -208,7 +216,8 @@ class Player {
 
 DaemonLink link_to(Client& client) {
   return {[&client](const Observation& observation) { return client.submit(observation); },
-          [&client](std::chrono::milliseconds timeout) { return client.next_update(timeout); }};
+          [&client](std::chrono::milliseconds timeout) { return client.next_update(timeout); },
+          [&client] { return client.session_status(); }};
 }
 
 Observation for_replay(Observation recorded) {
@@ -235,7 +244,8 @@ Result<ResumePoint> read_resume_point(const std::filesystem::path& journal) {
         return io::unreadable(journal, "observation " + std::to_string(record.sequence) + ": " +
                                            observation.error().message);
       }
-      point.last[observation->source] = record.sequence;
+      std::string source = observation->source;
+      point.last.insert_or_assign(std::move(source), *observation);
     }
     if (record.kind == io::RecordKind::kUpdate) point.last_update = record.sequence;
     ++point.records;
@@ -245,12 +255,34 @@ Result<ResumePoint> read_resume_point(const std::filesystem::path& journal) {
   return point;
 }
 
-std::vector<RecordedObservation> remaining(const std::vector<RecordedObservation>& recording,
-                                           const ResumePoint& point) {
+Result<std::vector<RecordedObservation>> remaining(
+    const std::vector<RecordedObservation>& recording, const ResumePoint& point) {
+  // What was measured, whoever measured it when.
+  const auto measured = [](const Observation& observation) {
+    Observation bare;
+    bare.sequence = observation.sequence;
+    bare.body = observation.body;
+    return wire::encode(bare);
+  };
+  for (const auto& [source, last] : point.last) {
+    const auto observes = [&](const auto& recorded) {
+      return recorded.observation.source == source;
+    };
+    const auto is_last = [&](const auto& recorded) {
+      return observes(recorded) && recorded.observation.sequence == last.sequence &&
+             measured(recorded.observation) == measured(last);
+    };
+    if (std::none_of(recording.begin(), recording.end(), observes)) continue;
+    if (std::any_of(recording.begin(), recording.end(), is_last)) continue;
+    return invalid(
+        fmt::format("is not the journal of this surgery: its observation {} of \"{}\" is "
+                    "another one, or none, there",
+                    last.sequence, source));
+  }
   std::vector<RecordedObservation> left;
   for (const RecordedObservation& recorded : recording) {
     const auto last = point.last.find(recorded.observation.source);
-    if (last != point.last.end() && recorded.observation.sequence < last->second) continue;
+    if (last != point.last.end() && recorded.observation.sequence < last->second.sequence) continue;
     left.push_back(recorded);
   }
   return left;
@@ -259,9 +291,9 @@ std::vector<RecordedObservation> remaining(const std::vector<RecordedObservation
 std::string describe(const ResumePoint& point) {
   if (point.last.empty()) return "begins anew: no observation is recorded";
   std::string text;
-  for (const auto& [source, sequence] : point.last) {
+  for (const auto& [source, last] : point.last) {
     text += text.empty() ? "goes on after observation " : " and ";
-    text += std::to_string(sequence) + " of " + source;
+    text += std::to_string(last.sequence) + " of " + source;
   }
   if (point.last_update > 0) text += ", update " + std::to_string(point.last_update);
   return text;

@@ -33,6 +33,8 @@ struct DaemonLink {
   std::function<Result<ObservationReceipt>(const Observation&)> submit;
   // Blocks up to the timeout; kUnavailable when it has passed.
   std::function<Result<UpdateMessage>(std::chrono::milliseconds)> next_update;
+  // Whether the session that is played to still runs: Client::session_status().
+  std::function<Status()> session_status = [] { return Status{}; };
 };
 // Keeps a reference to the client.
 DaemonLink link_to(Client& client);
@@ -90,10 +92,11 @@ struct PlayedSession {
   std::optional<Update> last;                // the last usable update (Update::usable)
   std::uint64_t last_recorded_sequence = 0;  // of the recorded observation that `last` answers
   std::vector<Iterate> iterates;             // of the observation that `last` answers
+  std::optional<Error> lost;                 // the daemon, or its session: why it ended early
 };
 
-// Never fails as a whole: each observation carries its own error. After kUnavailable the remaining
-// observations are not sent and carry the same error.
+// Never fails as a whole: each observation carries its own error. After kUnavailable, or when the
+// session has ended, the remaining observations are not sent and carry the same error.
 PlayedSession play(const DaemonLink& link, const std::vector<RecordedObservation>& recording,
                    const PlayOptions& options, const Progress& progress = {});
 
@@ -104,19 +107,20 @@ PlayedSession play(const DaemonLink& link, const std::vector<RecordedObservation
 // each source is sent again, and then all that came after it.
 struct ResumePoint {
   io::SurgeryMeta meta;
-  std::uint64_t records = 0;                  // in the valid prefix
-  std::map<std::string, std::uint64_t> last;  // by source: sequence of the last observation
-  std::uint64_t last_update = 0;              // its sequence; 0: none
-  std::optional<Error> broken;                // what ended the valid prefix
+  std::uint64_t records = 0;                // in the valid prefix
+  std::map<std::string, Observation> last;  // by source: its last observation
+  std::uint64_t last_update = 0;            // its sequence; 0: none
+  std::optional<Error> broken;              // what ended the valid prefix
 };
 
 // From the valid prefix of a journal, closed or not. kNotFound or kUnreadable when nothing of it
 // can be read.
 Result<ResumePoint> read_resume_point(const std::filesystem::path& journal);
 
-// What is left to send of a recording, in its order.
-std::vector<RecordedObservation> remaining(const std::vector<RecordedObservation>& recording,
-                                           const ResumePoint& point);
+// What is left to send of a recording, in its order. kInvalidArgument when the last observation of
+// one of its sources is not in the recording: the journal is of another surgery.
+Result<std::vector<RecordedObservation>> remaining(
+    const std::vector<RecordedObservation>& recording, const ResumePoint& point);
 
 // "goes on after observation 12 of ius and 3 of camera, update 14"
 std::string describe(const ResumePoint& point);

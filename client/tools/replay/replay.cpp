@@ -84,7 +84,9 @@ Status resume(const ReplayOptions& options, const io::SurgeryMeta& meta,
   }
   if (point->broken) notes.push_back(point->broken->message);
   notes.push_back(options.resume.string() + ": " + describe(*point));
-  observations = remaining(observations, *point);
+  auto left = remaining(observations, *point);
+  if (!left) return io::invalid_file(options.resume, left.error().message);
+  observations = *std::move(left);
   return {};
 }
 
@@ -290,6 +292,7 @@ Result<RunReport> run_boundary(const Surgery& surgery, const ReplayOptions& opti
 
   RunReport run = describe_run(surgery, *session, options, boundary);
   summarise(played, run);
+  run.lost = played.lost;
   report(progress, "measure " + run.boundary, 0.0);
   if (const auto unit = measure_run_unit(options.endpoint, session->daemon, session->model,
                                          surgery.meta.case_file, boundary)) {
@@ -367,6 +370,7 @@ Status replay(const ReplayOptions& options, const Progress& progress,
     if (!run) return tl::unexpected(run.error());
     if (on_run) on_run(*run);
     runs.push_back(std::move(*run));
+    if (runs.back().lost) break;
   }
   if (Status ok = write_reports(options.report, runs); !ok) return ok;
   for (const RunReport& run : runs) {
@@ -376,6 +380,13 @@ Status replay(const ReplayOptions& options, const Progress& progress,
         ErrorCode::kNotConverged, options.surgery,
         fmt::format("no observation was answered with an estimate under the {} boundary{}",
                     run.boundary, cause));
+  }
+  if (const RunReport& last = runs.back(); last.lost) {
+    return io::file_error(
+        last.lost->code, options.surgery,
+        fmt::format("played in part, {} observations have no answer: {}; {} holds "
+                    "what came before, --resume JOURNAL goes on",
+                    last.failures.size(), last.lost->message, options.report.string()));
   }
   return {};
 }

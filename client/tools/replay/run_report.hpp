@@ -185,6 +185,7 @@ struct RunReport {
   std::vector<PartStrength> prior_strengths;
   std::vector<WeightedStrengths> hypotheses;  // the most probable first
   std::vector<RunFailure> failures;
+  std::optional<Error> lost;  // why the replay ended early; each failure says it in the file
   std::vector<TracePoint> trace;
 };
 

@@ -249,6 +249,45 @@ TEST(Client, UpdatesThatWaitEndWithTheirSession) {
   EXPECT_EQ(client.latest_usable()->session_id, 2u);
 }
 
+TEST(Client, WhoStartedASessionObservesForNoOther) {
+  std::vector<SessionKey> observed;
+  FakeDaemon daemon([&](const Frame& request) -> Answers {
+    const std::uint64_t id = request.request_id;
+    SessionState other;
+    other.session = {7, 2, "m"};
+    switch (request.type) {
+      case MessageType::kStartSessionRequest: {
+        SessionInfo info;
+        info.boot_id = 7;
+        info.session_id = 1;
+        info.model_id = "m";
+        return {encode_frame(MessageType::kStartSessionReply, id, encode(info))};
+      }
+      case MessageType::kObservation:
+        observed.push_back(wire::decode_observation(request.payload)->session);
+        return {encode_frame(MessageType::kObservationReply, id, encode(ObservationReceipt{}))};
+      case MessageType::kSubscribeRequest:
+        return {encode_frame(MessageType::kSessionState, id, encode(other))};
+      default: return {};
+    }
+  });
+  Observation observation;
+  observation.source = "ius";
+  observation.body = LandmarkPairs{Points::Ones(3, 3), Points::Ones(3, 3), 0.1};
+  Client client = connect(daemon.endpoint());
+  ASSERT_TRUE(client.start_session({.case_id = "c"}));
+  ASSERT_TRUE(client.submit(observation));
+  EXPECT_TRUE(client.session_status());
+  ASSERT_TRUE(client.subscribe());
+  expect_error(client.submit(observation), ErrorCode::kUnavailable,
+               "session 1 has ended: another client has started session 2");
+  EXPECT_FALSE(client.session_status());
+  Client viewer = connect(daemon.endpoint());
+  ASSERT_TRUE(viewer.subscribe());
+  ASSERT_TRUE(viewer.submit(observation));
+  EXPECT_THAT(observed, testing::ElementsAre(SessionKey{7, 1, "m"}, SessionKey{7, 2, "m"}));
+}
+
 TEST(Client, AFieldOfAnotherMeshIsRefused) {
   FakeDaemon daemon([](const Frame& request) -> Answers {
     SessionInfo info;

@@ -306,7 +306,7 @@ TEST_F(Resume, ABrokenJournalCountsUpToTheBreak) {
   const auto point = value_or_fail(read_resume_point(path));
   ASSERT_TRUE(point.broken);
   EXPECT_THAT(point.broken->message, HasSubstr("record "));
-  EXPECT_EQ(point.last.at("ius"), point.records);
+  EXPECT_EQ(point.last.at("ius").sequence, point.records);
   EXPECT_LT(point.records, 200u);
   EXPECT_GT(point.records, 50u);
 }
@@ -319,15 +319,48 @@ TEST_F(Resume, TheLastRecordedObservationOfEverySourceIsSentAgain) {
     recording.push_back({0, observed("pointer", i)});
   }
   ResumePoint point;
-  point.last = {{"ius", 4}, {"camera", 13}, {"stranger", 9}};
+  point.last = {{"ius", observed("ius", 4)},
+                {"camera", observed("camera", 13)},
+                {"stranger", observed("stranger", 9)}};
   std::vector<std::string> left;
-  for (const auto& one : remaining(recording, point)) {
+  for (const auto& one : value_or_fail(remaining(recording, point))) {
     left.push_back(one.observation.source + std::to_string(one.observation.sequence));
   }
   EXPECT_THAT(left, ElementsAre("pointer1", "pointer2", "camera13", "pointer3", "ius4", "camera14",
                                 "pointer4"));
-  EXPECT_EQ(remaining(recording, {}).size(), recording.size());
+  EXPECT_EQ(remaining(recording, {})->size(), recording.size());
   EXPECT_EQ(describe(ResumePoint{}), "begins anew: no observation is recorded");
+}
+
+TEST_F(Resume, AJournalOfAnotherSurgeryIsRefused) {
+  const std::vector<RecordedObservation> recording = {{0, observed("ius", 1)}};
+  Observation other = observed("ius", 1);
+  std::get<LandmarkPairs>(other.body).deformed(0, 0) += 1e-9;
+  ResumePoint point;
+  for (const Observation& last : {other, observed("ius", 2)}) {
+    point.last = {{"ius", last}};
+    EXPECT_THAT(remaining(recording, point).error().message,
+                HasSubstr("observation " + std::to_string(last.sequence) + " of \"ius\""));
+  }
+}
+
+TEST(Play, EndsWhenItsSessionDoes) {
+  ScriptedDaemon daemon;
+  DaemonLink link = daemon.link();
+  link.session_status = [&]() -> Status {
+    if (daemon.submitted.size() < 2) return {};
+    return fail(ErrorCode::kUnavailable, "session 3 has ended");
+  };
+  daemon.script = [](const Observation& o) {
+    if (o.sequence == 1) return std::vector{update(o.sequence, true)};
+    return std::vector<UpdateMessage>{};
+  };
+  const PlayedSession played = play(link, recording(3), kOptions);
+  EXPECT_EQ(daemon.submitted.size(), 2u);
+  EXPECT_TRUE(played.observations[0].latency_ms);
+  for (const int i : {1, 2})
+    EXPECT_EQ(played.observations[i].error->message, "session 3 has ended");
+  ASSERT_TRUE(played.lost);
 }
 
 }  // namespace
