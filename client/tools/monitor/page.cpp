@@ -331,7 +331,9 @@ std::string summary(const Reports& reports) {
                         recent.p95_ms, recent.p99_ms, recent.max_ms);
   }
   if (now.journal) {
-    text += now.journal->recording ? ", recording" : ", NOT RECORDING: " + now.journal->reason;
+    text += now.journal->recording        ? ", recording"
+            : now.journal->reason.empty() ? ", journal waits for a session"
+                                          : ", NOT RECORDING: " + now.journal->reason;
   }
   if (const auto trouble = complaint(now)) text += ", ATTENTION: " + *trouble;
   return text;

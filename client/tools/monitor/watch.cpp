@@ -135,7 +135,7 @@ std::string status_line(const FieldStatus& status, bool json) {
   return line.dump(-1, ' ', false, nlohmann::ordered_json::error_handler_t::replace);
 }
 
-// Tells updates and, between them, that the field is no longer current.
+// Tells final updates and, between them, that the field is no longer current.
 class Watcher {
  public:
   Watcher(Client client, const WatchOptions& options,
@@ -152,7 +152,7 @@ class Watcher {
       auto message = std::exchange(next_, std::nullopt);
       if (!message) message = client_.next_update(kBetweenLooks);
       if (*message) {
-        tell(**message);
+        if ((*message)->update.final) tell(**message);
       } else if (message->error().code == ErrorCode::kUnavailable) {
         tell_change();
       } else {
@@ -167,7 +167,7 @@ class Watcher {
     WatchedUpdate update = watched(message, tumour_, mesh_nodes_);
     // Its age comes with the answer to the renewal that this wait sends, if nothing newer does.
     auto newer = client_.next_update(kForItsAge);
-    if (newer) next_ = std::move(newer);
+    if (newer && newer->update.final) next_ = std::move(newer);
     update.status = client_.field_status();
     if (next_) {
       update.status = {Currency::kSuperseded, "a newer update has come", std::nan(""),

@@ -126,8 +126,9 @@ TEST(Watch, AFailureSaysWhy) {
               HasSubstr("no field, none\n  no point is inside the brain"));
 }
 
-// A daemon of the toy patient that sends what was chosen once it is subscribed to.
-TEST(Watch, SubscribesWithTheChoiceAndEndsAfterItsCount) {
+// A daemon of the toy patient that sends what was chosen once it is subscribed to: a provisional
+// field, and the final one with the first renewal.
+TEST(Watch, SubscribesWithTheChoiceAndEndsAfterItsCountOfFinalUpdates) {
   BrainModel model = test_support::toy_patient(5);
   model.model_id = "toy";
   std::mutex mutex;
@@ -148,8 +149,10 @@ TEST(Watch, SubscribesWithTheChoiceAndEndsAfterItsCount) {
     state.valid_ms = SessionState::kMaxValidity_ms;
     FakeDaemon::Answers answers = {
         wire::encode_frame(MessageType::kSessionState, id, wire::encode(state))};
-    if (subscriptions.size() == 1) {
+    if (subscriptions.size() <= 2) {
       UpdateMessage message = update(1, 2);
+      message.update.final = subscriptions.size() == 2;
+      if (!message.update.final) message.update.estimate.quality = {};
       message.update.part = FieldPart{static_cast<int>(model.mesh.nodes.cols()), {3, 8}, 0};
       answers.push_back(wire::encode_frame(MessageType::kUpdate, 0, wire::encode(message)));
     }
@@ -162,6 +165,7 @@ TEST(Watch, SubscribesWithTheChoiceAndEndsAfterItsCount) {
   ASSERT_TRUE(status) << status.error().message;
   EXPECT_THAT(lines, ElementsAre(StartsWith("update 1  ")));
   EXPECT_THAT(lines.front(), HasSubstr("2 of 216 nodes (2 sent"));
+  EXPECT_THAT(lines.front(), HasSubstr("  good, "));
   const std::lock_guard lock(mutex);
   EXPECT_EQ(subscriptions.front().choice, choice);
   EXPECT_EQ(subscriptions.back().choice, choice) << "a renewal names the choice again";
