@@ -170,20 +170,41 @@ Result<Admission> Session::submit(Observation observation, TimePoint now, const 
          Outcome::kSuperseded, 0, 0,
          fmt::format("observation {} came before it was begun", observation.sequence)});
   }
-  const std::string source = observation.source;
-  boxes_.insert_or_assign(source, Box{std::move(observation), ++arrivals_, now, asleep});
+  Box box{std::move(observation), ++arrivals_, now, asleep};
+  if (waiting != boxes_.end()) {
+    box.passed_over = waiting->second.passed_over;
+    box.replaced = true;
+  }
+  std::string source = box.observation.source;
+  boxes_.insert_or_assign(std::move(source), std::move(box));
   return admission;
+}
+
+std::map<std::string, Session::Box>::iterator Session::whose_turn() {
+  const auto place = [&](const auto& entry) {
+    const auto& [source, box] = entry;
+    const bool hasty = box.replaced || running_->hasty.contains(source);
+    const bool waits_for_answers = running_->last_was_hasty && !hasty;
+    return std::tuple(!waits_for_answers, waits_for_answers ? 0 : -box.passed_over, box.order);
+  };
+  return std::min_element(boxes_.begin(), boxes_.end(),
+                          [&](const auto& a, const auto& b) { return place(a) < place(b); });
 }
 
 std::optional<Job> Session::next_job(TimePoint now) {
   work_.reset();
   if (ready_) begin();
   if (boxes_.empty()) return std::nullopt;
-  const auto oldest = std::min_element(
-      boxes_.begin(), boxes_.end(),
-      [](const auto& a, const auto& b) { return a.second.order < b.second.order; });
-  Box box = std::move(oldest->second);
-  boxes_.erase(oldest);
+  const auto turn = whose_turn();
+  Box box = std::move(turn->second);
+  boxes_.erase(turn);
+  for (auto& [source, other] : boxes_) ++other.passed_over;
+  running_->last_was_hasty = box.replaced || running_->hasty.contains(box.observation.source);
+  if (box.replaced) {
+    running_->hasty.insert(box.observation.source);
+  } else {
+    running_->hasty.erase(box.observation.source);
+  }
   work_ = Work{now, running_->model->deadline_s, running_->request.method, {}, false};
   return Job{std::move(box.observation),
              box.arrived,

@@ -9,7 +9,7 @@
 //                       until then; one of another method than condensed ends first: it uses the
 //                       factor that is at work then.
 //   submit()            checks an observation and leaves it in the box of its source
-//   next_job()          hands out the observation that arrived first,
+//   next_job()          hands out the observation whose turn it is,
 //   finish()            and turns its result into the message to publish
 //   take_events()       after each of these: what is to be recorded and answered
 //
@@ -17,10 +17,14 @@
 //   ready waits for the job that is handed out; without one it runs at once.
 //
 // Every source has a box for one observation: a newer one replaces an older one that has not been
-// handed out, so a slow inversion never works through a backlog. Only a new session and stop() end
-// a job early, whatever its method: its stop token reaches every iteration and every contact set.
-// The result of such a job is not published. After an error, and after an unusable estimate, the
-// usable one before it stays the valid one.
+// handed out, so a slow inversion never works through a backlog. A source is hasty when it sends
+// another observation before its last one is begun. After a job of a hasty source the others come
+// first, the one that was filled longest ago before all: who floods harms himself. Else the box
+// comes first that most jobs have passed over: every source has its turn.
+//
+// Only a new session and stop() end a job early, whatever its method: its stop token reaches every
+// iteration and every contact set. The result of such a job is not published. After an error, and
+// after an unusable estimate, the usable one before it stays the valid one.
 //
 // A session belongs to the client that started it, until that one leaves: another client ends it
 // only with `takeover`. A preparation is stopped when a later one is asked for, when its owner
@@ -33,6 +37,7 @@
 #include <map>
 #include <memory>
 #include <optional>
+#include <set>
 #include <stop_token>
 #include <string>
 #include <tuple>
@@ -181,7 +186,9 @@ class Session {
     std::string owner;
     SessionModel* model = nullptr;  // in models_
     Sources sources;
-    std::uint64_t numbered = 0;  // updates
+    std::set<std::string> hasty = {};  // sources, by what they sent before their last job
+    bool last_was_hasty = false;       // the source of the last job
+    std::uint64_t numbered = 0;        // updates
     std::uint64_t newest_update = 0;
     std::uint64_t newest_usable = 0;
     // The observation that newest_usable answers: acquired, on the daemon's clock; arrived, when
@@ -197,6 +204,8 @@ class Session {
     std::uint64_t order = 0;
     TimePoint arrived;
     std::chrono::nanoseconds asleep{0};
+    int passed_over = 0;    // by jobs of others, since the source's last one
+    bool replaced = false;  // one that was not begun
   };
   struct Work {  // the job that is handed out
     TimePoint since;
@@ -214,6 +223,7 @@ class Session {
   void make_ready(Start start, SessionModel* model);
   void begin();
   void end_running();
+  std::map<std::string, Box>::iterator whose_turn();
   void answer(const Start& start, Result<SessionInfo> info);
   void refuse(const Start& start, const std::string& why);
 

@@ -276,6 +276,47 @@ TEST_F(RunningSession, TheLatestObservationOfASourceReplacesOneThatHasNotStarted
   EXPECT_TRUE(decisions_[2].reason.empty());
 }
 
+TEST_F(RunningSession, ASourceThatSendsOftenHasItsTurnToo) {
+  std::vector<std::string> order;
+  std::uint64_t sequence = 0;
+  ASSERT_TRUE(submit(landmarks(++sequence, "left")));
+  ASSERT_TRUE(submit(landmarks(++sequence, "right")));
+  for (int i = 0; i < 10; ++i) {
+    const auto job = next_job();
+    order.push_back(job->observation.source);
+    if (order.back() != "ius") {
+      ASSERT_TRUE(submit(landmarks(++sequence, order.back())));
+    }
+    ASSERT_TRUE(submit(landmarks(++sequence, "ius")));
+    finish(*job, run(*job));
+  }
+  EXPECT_THAT(order, ElementsAre("left", "right", "left", "ius", "right", "left", "ius", "right",
+                                 "left", "ius"));
+}
+
+TEST_F(RunningSession, WhoWaitsForItsAnswersComesAfterOneJobOfThoseThatFlood) {
+  std::vector<std::string> order;
+  std::uint64_t sequence = 0;
+  const auto flood = [&] {
+    for (int i = 0; i < 2; ++i) {
+      for (const char* source : {"a", "b", "c", "d"}) {
+        ASSERT_TRUE(submit(landmarks(++sequence, source)));
+      }
+    }
+  };
+  flood();
+  for (int i = 0; i < 8; ++i) {
+    const auto job = next_job();
+    order.push_back(job->observation.source);
+    flood();
+    if (order.back() != "z") {
+      ASSERT_TRUE(submit(landmarks(++sequence, "z")));
+    }
+    finish(*job, run(*job));
+  }
+  EXPECT_THAT(order, ElementsAre("a", "z", "b", "z", "c", "z", "d", "z"));
+}
+
 TEST_F(RunningSession, AnErrorIsPublishedWithItsReasonAndTheNextObservationIsAnswered) {
   update_ = [](int call, const SparseData& data, const auto&, Estimate& out) -> Status {
     if (call == 1) return fail(ErrorCode::kNotConverged, "no luck");
