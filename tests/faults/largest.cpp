@@ -144,15 +144,12 @@ Timed time_others(client::Client& client, const Feed& feed, std::size_t& next, d
     if (client.submit(small)) {
       while (!answered && Clock::now() - sent < std::chrono::seconds(10)) {
         const auto message = client.next_update(milliseconds(100));
-        answered = message && message->update.final && !message->error &&
-                   message->update.observation_sequence >= small.sequence;
-        // The flood's updates answer the newest of every source, so this one's too.
-        for (std::size_t s = 0;
-             message && !message->error && s < message->update.estimate.sources.size(); ++s) {
-          const SourceSummary& source = message->update.estimate.sources[s];
-          answered = answered || (source.source == small.source &&
-                                  source.observation_sequence >= small.sequence);
-        }
+        // An update answers the newest of every source that it names.
+        if (!message || !message->update.final || message->error) continue;
+        const auto& used = message->update.estimate.sources;
+        answered = std::any_of(used.begin(), used.end(), [&](const SourceSummary& source) {
+          return source.source == small.source && source.observation_sequence >= small.sequence;
+        });
       }
     }
     if (answered) {
