@@ -27,24 +27,28 @@ tl::unexpected<Error> refuse(const Observation& observation, const std::string& 
                              in_quotes(observation.source), why));
 }
 
-Status at_most(const char* field, const char* unit, Eigen::Index count, int limit) {
-  if (count <= limit) return {};
-  return invalid(
-      fmt::format("observation.{} has {} {}, must be at most {}", field, count, unit, limit));
+Status check_count(const char* field, const char* unit, Eigen::Index count, int fewest, int most) {
+  if (count >= fewest && count <= most) return {};
+  return invalid(fmt::format("observation.{} has {} {}, must be at {} {}", field, count, unit,
+                             count < fewest ? "least" : "most", count < fewest ? fewest : most));
 }
 
 Status check_size(const TumourBoundary& body) {
-  return at_most("tumour_boundary", "points", body.points.cols(), kMaxObservedPoints);
+  return check_count("tumour_boundary", "points", body.points.cols(), kMinObservedPoints,
+                     kMaxObservedPoints);
 }
 Status check_size(const CorticalSurface& body) {
   const auto& [vertices, triangles] = body.surface;
-  if (auto ok = at_most("cortical_surface", "points", vertices.cols(), kMaxObservedPoints); !ok) {
+  if (auto ok = check_count("cortical_surface", "points", vertices.cols(), kMinObservedPoints,
+                            kMaxObservedPoints);
+      !ok) {
     return ok;
   }
-  return at_most("cortical_surface", "triangles", triangles.cols(), kMaxObservedTriangles);
+  return check_count("cortical_surface", "triangles", triangles.cols(), 0, kMaxObservedTriangles);
 }
 Status check_size(const LandmarkPairs& body) {
-  return at_most("landmark_pairs", "pairs", body.undeformed.cols(), kMaxLandmarkPairs);
+  return check_count("landmark_pairs", "pairs", body.undeformed.cols(), kMinObservedPoints,
+                     kMaxLandmarkPairs);
 }
 Status check_size(const PatientPose&) {
   return invalid(

@@ -19,15 +19,15 @@ namespace brainshift::server {
 // What a daemon takes of one observation, so that no observation keeps it from the others for long:
 // an alignment of so many points takes less than a second, and as many pairs as a surgeon touches.
 inline constexpr int kMaxObservedPoints = 50'000;      // of a boundary or a surface
+inline constexpr int kMinObservedPoints = 3;           // or pairs: fewer show no motion
 inline constexpr int kMaxObservedTriangles = 100'000;  // of a surface
 inline constexpr int kMaxLandmarkPairs = 1'000;
 
 // Ok, or kInvalidArgument for another case, session, model or daemon than `running`, a frame other
-// than "ras", an empty or overlong source, more points, triangles or pairs than an observation may
-// have (below), or a body that no update uses (PatientPose). The sentence names
-// the field and its value. The numbers of the body are not looked at:
-// wire::decode_observation has tested that they are finite and that standard deviations are not
-// negative.
+// than "ras", an empty or overlong source, more or fewer points, triangles or pairs than an
+// observation may have, or a body that no update uses (PatientPose). The sentence names the field
+// and its value. The numbers of the body are not looked at: wire::decode_observation has tested
+// that they are finite and that standard deviations are not negative.
 Status check_observation(const Observation& observation, std::string_view case_id,
                          const SessionKey& running);
 

@@ -39,6 +39,14 @@ TEST(CheckObservation, NamesTheRuleThatIsBroken) {
        },
        "tumour_boundary has 50001 points"},
       {[](Observation& o) {
+         o.body = TumourBoundary{Points(3, 0), 0.5};
+       },
+       "tumour_boundary has 0 points, must be at least 3"},
+      {[](Observation& o) {
+         o.body = LandmarkPairs{Points::Zero(3, 2), Points::Zero(3, 2), 0.5};
+       },
+       "landmark_pairs has 2 pairs, must be at least 3"},
+      {[](Observation& o) {
          o.body = CorticalSurface{{Points::Zero(3, kMaxObservedPoints + 1), {}}, 0.5};
        },
        "cortical_surface has 50001 points"},
