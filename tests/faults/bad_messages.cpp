@@ -8,6 +8,7 @@
 #include <cstring>
 #include <functional>
 #include <limits>
+#include <memory>
 #include <random>
 #include <stdexcept>
 #include <string>
@@ -29,7 +30,9 @@ using test_support::ZmtpPeer;
 using wire::MessageType;
 using Parts = std::vector<std::string>;
 
-constexpr int kBeforeNext = 2048;  // messages to a connection before it is made anew
+constexpr int kRounds = 16;        // with a set of connections before it is made anew
+constexpr int kSenders = 8;        // the daemon reads each at a bounded rate
+constexpr int kBeforeDrain = 128;  // messages to a connection
 
 // Messages that are refused, made from one observation that would be accepted.
 class BadMessages {
@@ -173,12 +176,19 @@ void run_bad_messages(const Settings& settings, Tally& tally) {
     idle_mib = daemon.resident_mib();
     BadMessages messages(acceptable(feed, opened), settings.seed);
     for (int sent = 0; sent < settings.count;) {
-      Sender sender(daemon.endpoint());
-      for (int i = 0; i < kBeforeNext && sent < settings.count; ++i, ++sent) {
-        sender.send(messages.next(static_cast<std::size_t>(sent)));
-        if (i % 128 == 127) accepted += sender.drain();
+      std::vector<std::unique_ptr<Sender>> senders;
+      for (int i = 0; i < kSenders; ++i) {
+        senders.push_back(std::make_unique<Sender>(daemon.endpoint()));
       }
-      accepted += sender.drain();
+      for (int round = 0; round < kRounds && sent < settings.count; ++round) {
+        for (const auto& sender : senders) {
+          for (int i = 0; i < kBeforeDrain && sent < settings.count; ++i, ++sent) {
+            sender->send(messages.next(static_cast<std::size_t>(sent)));
+          }
+        }
+        for (const auto& sender : senders) accepted += sender->drain();
+      }
+      senders.clear();
       // Sizes beyond ZeroMQ's own cap end their connection.
       ZmtpPeer liar(port_of(daemon.endpoint()));
       if (liar.shake_hands()) liar.claim_part(std::uint64_t{1} << 62);
