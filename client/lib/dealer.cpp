@@ -65,7 +65,14 @@ class Message {
   Message& operator=(const Message&) = delete;
   ~Message() { zmq_msg_close(&message_); }
 
-  bool receive(void* socket) { return zmq_msg_recv(&message_, socket, ZMQ_DONTWAIT) >= 0; }
+  // A signal is no failure.
+  bool receive(void* socket) {
+    int size = -1;
+    do {
+      size = zmq_msg_recv(&message_, socket, ZMQ_DONTWAIT);
+    } while (size < 0 && errno == EINTR);
+    return size >= 0;
+  }
   bool more() const { return zmq_msg_more(&message_) != 0; }
   std::string bytes() {
     return {static_cast<const char*>(zmq_msg_data(&message_)), zmq_msg_size(&message_)};

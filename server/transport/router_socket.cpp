@@ -12,6 +12,7 @@
 #include <utility>
 
 #include "common/wire/frame.hpp"
+#include "server/transport/uninterrupted.hpp"
 
 namespace brainshift::server {
 namespace {
@@ -71,13 +72,16 @@ std::string RouterSocket::bind() {
 
 std::optional<Incoming> RouterSocket::receive() {
   zmq::message_t routing_id;
-  if (!socket_.recv(routing_id, zmq::recv_flags::dontwait)) return std::nullopt;
+  const auto any =
+      uninterrupted([&] { return socket_.recv(routing_id, zmq::recv_flags::dontwait); });
+  if (!any) return std::nullopt;
   Incoming incoming;
   incoming.peer = routing_id.to_string();
   bool more = routing_id.more();
   while (more) {
     zmq::message_t part;
-    static_cast<void>(socket_.recv(part));  // the rest of a message is always there
+    // The rest of a message is always there.
+    static_cast<void>(uninterrupted([&] { return socket_.recv(part); }));
     more = part.more();
     incoming.bytes += part.size();
     if (incoming.parts++ == 0) {
@@ -92,15 +96,20 @@ std::optional<Incoming> RouterSocket::receive() {
 Sent RouterSocket::send(const std::string& peer, const Bytes& bytes) {
   constexpr auto kNow = zmq::send_flags::dontwait;
   const auto begin = [&] {
-    return socket_.send(zmq::buffer(peer), kNow | zmq::send_flags::sndmore).has_value();
+    const auto part = [&] {
+      return socket_.send(zmq::buffer(peer), kNow | zmq::send_flags::sndmore);
+    };
+    return uninterrupted(part).has_value();
   };
   try {
     if (!begin()) {
       // libzmq takes note only now and then of what a peer has read; asked for its events, it does.
-      static_cast<void>(socket_.get(zmq::sockopt::events));
+      static_cast<void>(uninterrupted([&] { return socket_.get(zmq::sockopt::events); }));
       if (!begin()) return Sent::kQueueFull;
     }
-    return socket_.send(share(bytes), kNow) ? Sent::kYes : Sent::kQueueFull;
+    zmq::message_t shared = share(bytes);  // stays whole where a call gives up
+    const auto rest = uninterrupted([&] { return socket_.send(shared, kNow); });
+    return rest ? Sent::kYes : Sent::kQueueFull;
   } catch (const zmq::error_t& error) {
     if (error.num() == EHOSTUNREACH) return Sent::kPeerGone;
     throw;
@@ -120,7 +129,10 @@ ConnectionMonitor::ConnectionMonitor(zmq::context_t& context, zmq::socket_t& wat
 std::vector<int> ConnectionMonitor::closed() {
   std::vector<int> descriptors;
   zmq::message_t event;
-  while (receiver_.recv(event, zmq::recv_flags::dontwait)) {
+  const auto receive = [&](zmq::message_t& part) {
+    return uninterrupted([&] { return receiver_.recv(part, zmq::recv_flags::dontwait); });
+  };
+  while (receive(event)) {
     // An event is 16 bits of number and 32 bits of value, followed by a frame with the address.
     if (event.size() == sizeof(std::uint16_t) + sizeof(std::int32_t)) {
       std::int32_t descriptor = -1;
@@ -128,7 +140,7 @@ std::vector<int> ConnectionMonitor::closed() {
       descriptors.push_back(descriptor);
     }
     zmq::message_t address;
-    static_cast<void>(receiver_.recv(address, zmq::recv_flags::dontwait));
+    static_cast<void>(receive(address));
   }
   return descriptors;
 }

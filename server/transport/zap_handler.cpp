@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "server/transport/zap_handler.hpp"
+#include "server/transport/uninterrupted.hpp"
 
 #include <spdlog/spdlog.h>
 #include <sys/eventfd.h>
@@ -27,7 +28,7 @@ std::vector<zmq::message_t> receive_all(zmq::socket_t& socket) {
   std::vector<zmq::message_t> parts;
   do {
     zmq::message_t part;
-    if (!socket.recv(part, zmq::recv_flags::dontwait)) break;
+    if (!uninterrupted([&] { return socket.recv(part, zmq::recv_flags::dontwait); })) break;
     parts.push_back(std::move(part));
   } while (parts.back().more());
   return parts;
@@ -109,9 +110,10 @@ void ZapHandler::answer() {
   const std::string code = admit ? "200" : "400", text = admit ? "OK" : "unknown key";
   for (const std::string& part :
        {std::string(kVersion), parts[kRequestId].to_string(), code, text, name}) {
-    socket_.send(zmq::buffer(part), kMore);
+    uninterrupted([&] { return socket_.send(zmq::buffer(part), kMore); });
   }
-  socket_.send(zmq::message_t(), zmq::send_flags::none);  // no metadata
+  const auto no_metadata = [&] { return socket_.send(zmq::message_t(), zmq::send_flags::none); };
+  uninterrupted(no_metadata);
 }
 
 }  // namespace brainshift::server
