@@ -13,6 +13,8 @@ namespace {
 constexpr double kFarthest_mm = 100.0;
 // How often the end of a sweep is looked for.
 constexpr std::chrono::milliseconds kLook{100};
+// A bridge that has just begun reads the daemon's model first, and learns of the session then.
+constexpr std::chrono::seconds kForTheModel{30};
 constexpr std::chrono::milliseconds kForASession{2000};
 constexpr std::size_t kSmallMessage = 1024;
 
@@ -138,8 +140,8 @@ std::uint64_t InboundWorker::next_sequence(const std::string& source) {
 Status InboundWorker::submit(const Found& found, const std::stop_token& stop) {
   Followed followed;
   {
-    // A bridge that has just begun learns of the session within moments.
     std::unique_lock lock(mutex_);
+    news_.wait_until(lock, stop, begun_ + kForTheModel, [&] { return !followed_.case_id.empty(); });
     news_.wait_for(lock, stop, kForASession, [&] { return followed_.session.session_id != 0; });
     followed = followed_;
     const bool ours =

@@ -63,6 +63,7 @@ class InboundWorker {
   std::function<void(const std::string&)> tell_;
   std::optional<Client> client_;
   std::map<std::string, std::uint64_t> sequences_;
+  const std::chrono::steady_clock::time_point begun_ = std::chrono::steady_clock::now();
 
   std::mutex mutex_;  // of all below
   std::condition_variable_any news_;

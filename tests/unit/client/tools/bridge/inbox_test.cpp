@@ -501,7 +501,11 @@ TEST(InboundWorker, WithoutASessionItSaysSo) {
   message.content = list;
   worker.post(std::move(message));
   const std::jthread thread([&](const std::stop_token& stop) { worker.run(stop); });
-  EXPECT_THAT(told.get_future().get(), HasSubstr("not accepted: no session runs"));
+  auto line = told.get_future();
+  EXPECT_EQ(line.wait_for(std::chrono::milliseconds(2500)), std::future_status::timeout)
+      << "the model may still be read";
+  worker.follow({"toy", Vec3(30, 30, 40), {}});
+  EXPECT_THAT(line.get(), HasSubstr("not accepted: no session runs"));
 }
 
 }  // namespace
