@@ -52,7 +52,7 @@ namespace brainshift::pipeline {
 
 // As many as guide an estimate for a surface (registration/surface_distances.hpp).
 inline constexpr int kMostLandmarks = 300;
-// Twice the resolution at which a feature is found in an image of ultrasound.
+// Nearer pairs are taken to be of one feature, found once. Chosen, not measured.
 inline constexpr double kOneFeature_mm = 2.0;
 // More do not make an alignment better: what neighbouring points are off by alike remains.
 inline constexpr int kMostAligned = 5000;

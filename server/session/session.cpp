@@ -180,11 +180,14 @@ Result<Admission> Session::submit(Observation observation, TimePoint now, const 
   return admission;
 }
 
+bool Session::hasty(const Box& box) const {
+  return box.replaced || running_->hasty.contains(box.observation.source);
+}
+
 std::map<std::string, Session::Box>::iterator Session::whose_turn() {
   const auto place = [&](const auto& entry) {
-    const auto& [source, box] = entry;
-    const bool hasty = box.replaced || running_->hasty.contains(source);
-    const bool waits_for_answers = running_->last_was_hasty && !hasty;
+    const Box& box = entry.second;
+    const bool waits_for_answers = running_->last_was_hasty && !hasty(box);
     return std::tuple(!waits_for_answers, waits_for_answers ? 0 : -box.passed_over, box.order);
   };
   return std::min_element(boxes_.begin(), boxes_.end(),
@@ -199,7 +202,7 @@ std::optional<Job> Session::next_job(TimePoint now) {
   Box box = std::move(turn->second);
   boxes_.erase(turn);
   for (auto& [source, other] : boxes_) ++other.passed_over;
-  running_->last_was_hasty = box.replaced || running_->hasty.contains(box.observation.source);
+  running_->last_was_hasty = hasty(box);
   if (box.replaced) {
     running_->hasty.insert(box.observation.source);
   } else {

@@ -223,6 +223,7 @@ class Session {
   void make_ready(Start start, SessionModel* model);
   void begin();
   void end_running();
+  bool hasty(const Box& box) const;
   std::map<std::string, Box>::iterator whose_turn();
   void answer(const Start& start, Result<SessionInfo> info);
   void refuse(const Start& start, const std::string& why);

@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "server/transport/zap_handler.hpp"
-#include "server/transport/uninterrupted.hpp"
 
 #include <spdlog/spdlog.h>
 #include <sys/eventfd.h>
@@ -13,6 +12,8 @@
 #include <system_error>
 #include <utility>
 #include <vector>
+
+#include "server/transport/uninterrupted.hpp"
 
 namespace brainshift::server {
 namespace {

@@ -35,6 +35,15 @@ std::uint64_t final_updates(const wire::DaemonReport& report) {
   return report.usable + report.unusable + report.failures;
 }
 
+// Of a daemon that keeps a journal.
+bool waits_for_a_session(const wire::DaemonReport& report) {
+  return report.journal->file.empty() && report.session.session.session_id == 0;
+}
+std::string recording_text(const wire::DaemonReport& report) {
+  if (waits_for_a_session(report)) return "waits for a session";
+  return report.journal->recording ? "recording" : "NOT RECORDING: " + report.journal->reason;
+}
+
 std::string mebibytes(std::uint64_t bytes) {
   return fmt::format("{:.1f} MiB", static_cast<double>(bytes) / 1048576.0);
 }
@@ -191,12 +200,9 @@ class Page {
   void add_journal() {
     if (!now_.journal) return add("journal", "none is configured");
     const wire::JournalFigures& journal = *now_.journal;
-    if (journal.file.empty() && now_.session.session.session_id == 0) {
-      return add("journal", "waits for a session");
-    }
+    if (waits_for_a_session(now_)) return add("journal", recording_text(now_));
     const std::string file = journal.file.empty() ? "no file" : journal.file;
-    add("journal", journal.recording ? "recording" : "NOT RECORDING: " + journal.reason,
-        !journal.recording);
+    add("journal", recording_text(now_), !journal.recording);
     add("",
         fmt::format("{}, {}, {} records, {} lost", file, mebibytes(journal.bytes), journal.records,
                     journal.lost),
@@ -331,9 +337,7 @@ std::string summary(const Reports& reports) {
                         recent.p95_ms, recent.p99_ms, recent.max_ms);
   }
   if (now.journal) {
-    text += now.journal->recording        ? ", recording"
-            : now.journal->reason.empty() ? ", journal waits for a session"
-                                          : ", NOT RECORDING: " + now.journal->reason;
+    text += (waits_for_a_session(now) ? ", journal " : ", ") + recording_text(now);
   }
   if (const auto trouble = complaint(now)) text += ", ATTENTION: " + *trouble;
   return text;

@@ -150,9 +150,9 @@ class Watcher {
     if (Status status = client_.subscribe(1, options_.choice); !status) return status;
     while (options_.count == 0 || told_ < options_.count) {
       auto message = std::exchange(next_, std::nullopt);
-      if (!message) message = client_.next_update(kBetweenLooks);
+      if (!message) message = next_final(kBetweenLooks);
       if (*message) {
-        if ((*message)->update.final) tell(**message);
+        tell(**message);
       } else if (message->error().code == ErrorCode::kUnavailable) {
         tell_change();
       } else {
@@ -163,11 +163,18 @@ class Watcher {
   }
 
  private:
+  // Provisional fields are for programs that ask, not to be shown.
+  Result<UpdateMessage> next_final(std::chrono::milliseconds timeout) {
+    auto message = client_.next_update(timeout);
+    while (message && !message->update.final) message = client_.next_update(timeout);
+    return message;
+  }
+
   void tell(const UpdateMessage& message) {
     WatchedUpdate update = watched(message, tumour_, mesh_nodes_);
     // Its age comes with the answer to the renewal that this wait sends, if nothing newer does.
-    auto newer = client_.next_update(kForItsAge);
-    if (newer && newer->update.final) next_ = std::move(newer);
+    auto newer = next_final(kForItsAge);
+    if (newer) next_ = std::move(newer);
     update.status = client_.field_status();
     if (next_) {
       update.status = {Currency::kSuperseded, "a newer update has come", std::nan(""),

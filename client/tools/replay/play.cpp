@@ -149,8 +149,8 @@ class Player {
       } else if (now - asked < left / 2) {
         lost_ = message.error();  // unavailable well before the time was up: the daemon is gone
       }
-      if (const Status session = link_.session_status(); !session && !lost_)
-        lost_ = session.error();
+      if (done() || lost_) return;
+      if (const Status session = link_.session_status(); !session) lost_ = session.error();
     }
   }
 
